@@ -275,7 +275,7 @@ class ParticleCommands:
             application
             deposits a layer as thick as a column is wide, until the level is reached.
         rise : upward velocity of the levels, from the command on [m/s].
-        years : years that a second of the model stands for; diffuse, erode, deposit and rise are then per year.
+        years : years represented by a second of model time; diffuse, erode, deposit and rise are then per year.
         only : groups whose discs may be eroded; other groups protect what lies below them (default: all).
         rad : radii of deposited discs, drawn at random; a repeated one is more likely [m].
         porosity : porosity of eroded and deposited material: bulk area = area of discs / (1 - porosity) (default:

@@ -622,9 +622,10 @@ class Simulation(ParticleCommands, BlockCommands):
     # ---- ours ------------------------------------------------------------------------------------------------------
 
     def _asked(self, key: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
-        """Return the result of `make`. In a PCDC script the journal stores it, with a checksum of `key`, so
-        that a run that resumes from a checkpoint finds the way back: particles that come out of the checkpoint do
-        nothing until then, and receive the same values as before. again: done in any case."""
+        """Return the result of `make`. In a PCDC script the journal stores it, with a checksum of `key`, so that a
+        resumed run can replay the script: until the checkpoint, restored particles do nothing and receive the recorded
+        values. again: call `make` in any case.
+        """
         running = self._session.interpreter
         if running is None:
             return make()
@@ -771,7 +772,7 @@ class Simulation(ParticleCommands, BlockCommands):
         return self._asked((name,), table)
 
     def _ready(self) -> None:
-        """Lists, ghosts and masses in place, as kernels that look at contacts need them."""
+        """Prepare lists, ghosts and masses for kernels that read contacts."""
         self.engine.close_model()
 
     def _existing(self, file: str | Path) -> str:

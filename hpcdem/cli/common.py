@@ -80,8 +80,9 @@ def messages_only() -> Iterator[None]:
 def run_program(
     command: click.Command, program: str, words: list[str], work: Callable[[Comm, Log, dict[str, Any]], None]
 ) -> NoReturn:
-    """A program that looks at finished runs: read its command line, start the ranks, call `work(comm, log, options)`
-    on each, end together. An option called "threads" is the number of threads per rank."""
+    """Run a program that reads finished runs: read its command line, start the ranks, call `work(comm, log, options)`
+    on each, end together. An option called "threads" is the number of threads per rank.
+    """
     with messages_only(), launch.one_voice():
         options = read_command_line(command, program, words)
         launch.prepare_environment(options.get("threads") or launch.threads_by_default())

@@ -35,7 +35,7 @@ def doctor(**options: Any) -> None:
 
 
 def start(words: list[str], cores_before: int) -> NoReturn:
-    """Collective: look, print, leave. A launch that a run would refuse is a finding like others."""
+    """Check the machine, print the findings and exit. A launch that a run would reject is a finding too. Collective."""
     with messages_only(), launch.one_voice():
         options = read_command_line(doctor, "hpcdem doctor", words)
         threads, _ = launch.prepare_environment(options["threads"] or launch.threads_by_default())

@@ -30,7 +30,7 @@ def info(**options: Any) -> None:
 
 
 def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
-    """Collective; rank 0 looks and prints. HpcdemError if something is damaged."""
+    """Inspect and print on rank 0. HpcdemError if something is damaged. Collective."""
     from hpcdem.io.agreed import on_first
 
     def inspect() -> int:
@@ -83,8 +83,9 @@ def _text(value: Any) -> str:
 
 
 def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
-    """Facts about the run that wrote into a folder. every: look into all files, not only the last two checkpoints and
-    the last frame."""
+    """Facts about the run that wrote into a folder. every: inspect all files, not only the last two checkpoints and the
+    last frame.
+    """
     from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
     from hpcdem.post import inventory
 

@@ -253,7 +253,7 @@ def go_on(sim: Simulation, script: Script, log: Log, before: float = math.inf) -
 
 
 def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, int]:
-    """Steps of the whole script, and how many of them were done before the checkpoint; 0, 0 if it does not tell."""
+    """Steps of the whole script, and how many of them were done before the checkpoint; 0, 0 if unknown."""
     from hpcdem.lang.zdem import plan
 
     runs = plan.follow(script.statements)

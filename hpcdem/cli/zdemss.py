@@ -128,7 +128,7 @@ def zdemss(**options: object) -> None:
 
 
 def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
-    """Collective: draw what the command line asks for. Raises HpcdemError on all ranks."""
+    """Draw what the command line requests. Collective. Raises HpcdemError on all ranks."""
     from hpcdem.post.sections import draw, panels
 
     switches = {

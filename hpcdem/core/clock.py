@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Clock:
     """Step number, model time [s] and time step [s].
 
-    The time is the sum of the steps taken: a script may change dt on its way, so it is not ``step * dt``.
+    The time is the sum of the steps taken: a script may change dt during a run, so it is not ``step * dt``.
     """
 
     step: int = 0

@@ -16,7 +16,7 @@ from hpcdem.core.errors import CommandError
 
 @dataclass(frozen=True)
 class System:
-    """length [m], mass [kg] and time [s]: sizes of its units; names: what stands for the symbols of SI."""
+    """length [m], mass [kg] and time [s]: sizes of its units; names: symbols that replace those of SI."""
 
     name: str
     length: float = 1.0

@@ -90,7 +90,7 @@ class Ownership:
     ) -> None:
         """Choose boundaries for particles (or elements) at places (n,) i8 of this rank. Collective.
 
-        busy: seconds of work of this rank so far; room: x range [m] of possible positions, if known; cost: (n,),
+        busy: seconds of work of this rank so far; room: x range of possible positions [m], if known; cost: (n,),
         relative cost of each row, if known; least: smallest number of columns of a rank. Raises UsageError if a new
         model has fewer columns than ranks. A model that lost columns later, or was restored with fewer, continues with
         idle ranks.

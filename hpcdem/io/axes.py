@@ -119,7 +119,7 @@ def view(frame: Frame, extent: tuple[float, float, float, float] | None = None) 
 
 
 def particle_extent(frame: Frame) -> tuple[float, float, float, float]:
-    """Left, right, bottom, top of this rank's particles [m]; infinite the wrong way round if it has none."""
+    """Left, right, bottom, top of this rank's particles [m]; reversed infinite bounds without particles."""
     columns = frame.tables["particles"].columns
     x, y, r = (np.asarray(columns.get(k, np.zeros(0))) for k in ("x", "y", "radius"))
     return (

@@ -1,6 +1,6 @@
 """Files of sections, each made by all ranks or by rank 0: whole, or not there.
 
-Only rank 0 touches the disk; data of other ranks comes to it in bounded pieces.
+Only rank 0 touches the disk; other ranks send it their data in bounded pieces.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ def write_sections(
 ) -> None:
     """Collective: write a file of sections, each either bytes (rank 0's are taken) or a table in slabs by rank.
 
-    `build` is called on every rank and must return the same kinds of section in the same order everywhere; it may
-    be collective. The bytes of the file do not depend on the rank count. Raises HpcdemError on all ranks; with `later`
-    the file is on its way afterwards, and whoever settles the deliveries hears of the disk.
+    `build` is called on every rank and must return the same kinds of section in the same order everywhere; it may be
+    collective. The bytes of the file do not depend on the rank count. Raises HpcdemError on all ranks; with `later` the
+    file is written in the background, and settling the deliveries raises errors of the disk.
     """
     sections: Sequence[Section] = ()
     error = None

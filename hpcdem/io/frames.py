@@ -35,12 +35,12 @@ def frame_name(step: int, suffix: str, ini: bool = False, stem: str = "all") -> 
 
 
 def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
-    """The frames in a folder in the order of time: by step, the `_ini` one after that of the same step, since it
-    shows what was done between two commands. Those that an earlier run has left there, as run.json tells, do not count;
-    `left_out` says which.
+    """The frames in a folder in the order of time: by step, the `_ini` one after that of the same step, since it shows
+    what was done between two commands. Frames of an earlier run, according to run.json, are ignored; `left_out`
+    describes them.
 
-    Where a frame is there in several formats, the first of FORMATS is taken. Raises HpcdemError if the folder
-    cannot be read.
+    Where a frame is there in several formats, the first of FORMATS is taken. Raises HpcdemError if the folder cannot be
+    read.
     """
     best: dict[tuple[int, bool], tuple[int, str]] = {}
     for name in _names(folder)[0]:

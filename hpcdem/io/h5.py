@@ -1,7 +1,7 @@
 """HDF5 files that many ranks write together: one dataset per column, one slab of it per rank.
 
 With an h5py that has MPI, and a core for each rank, all ranks write their slabs collectively; otherwise the slabs pass
-through rank 0, one rank after the other, in bounded pieces. Layout and content are the same either way.
+through rank 0, one rank after the other, in bounded pieces. Both give the same layout and content.
 """
 
 from __future__ import annotations
@@ -259,7 +259,8 @@ def _write_rows(made: Any, rows: np.ndarray, offset: int, how: Any = None) -> No
 @contextmanager
 def writing(path: str | os.PathLike, comm: Comm, later: Deliveries | None = None) -> Iterator[Writer]:
     """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks; with
-    `later` the file may be on its way afterwards, and whoever settles the deliveries hears of the disk."""
+    `later` the file may be written in the background, and settling the deliveries raises errors of the disk.
+    """
     if has_mpi(comm):
         with writing_to(path, comm) as writer:
             yield writer

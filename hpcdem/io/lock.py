@@ -1,7 +1,7 @@
 """A lock on a folder that ends with the process that holds it, however that ends.
 
 The lock is the system's (flock on a file `.lock` in the folder), so a killed run, a crashed node or a full disk leaves
-none behind; the file itself may stay and means nothing. Its content tells others who holds the lock.
+none behind; the file itself may stay and means nothing. Its content names the holder of the lock.
 """
 
 from __future__ import annotations

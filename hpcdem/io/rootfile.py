@@ -29,7 +29,7 @@ class RootFile:
     Pieces are collected, put in order, and written many at a time. With `later`, that is done behind the back of the
     caller: data handed in must not change.
 
-    starts: where named parts of the file begin; size: its length, if told by `describe`.
+    starts: where named parts of the file begin; size: its length, if given by `describe`.
     """
 
     def __init__(self, path: str | os.PathLike, later: Deliveries | None = None, temporary: str = "") -> None:
@@ -71,7 +71,7 @@ class RootFile:
             self._flush()
 
     def claim(self) -> None:
-        """Get disk space for the size told by `describe`, holes included."""
+        """Get disk space for the size given by `describe`, holes included."""
         self._flush()
         self._do(lambda: os.posix_fallocate(self._handle, 0, self.size) if self.size else None)
 

@@ -1,4 +1,4 @@
-"""Bytes on their way to rank 0: in blocks of bounded size, one rank after the other."""
+"""Transfer of bytes to rank 0 in blocks of bounded size, from one rank after the other."""
 
 from __future__ import annotations
 

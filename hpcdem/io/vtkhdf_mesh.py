@@ -2,7 +2,7 @@
 
 Points are the corners of the elements, element by element (in the plane z = 0): where joints open, corners that began
 as one point part. Cells are the elements in the order of their numbers (VTK_TRIANGLE, VTK_QUAD, in space VTK_TETRA),
-then the joints: their lower face, VTK_LINE, in space VTK_TRIANGLE. The cell data `cell` tells them apart; what one of
+then the joints: their lower face, VTK_LINE, in space VTK_TRIANGLE. The cell data `cell` distinguishes them; what one of
 them does not have is NaN, or -1 for whole numbers.
 
 Format: VTK File Formats, section VTKHDF, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html

@@ -21,7 +21,7 @@ _PYTHON_LINE = re.compile(
 
 
 def kind(source: bytes | str, file: str = "script") -> str:
-    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python, and whatever stands in a file *.sc) or "python"
+    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python, and the contents of any file *.sc) or "python"
     (Python that imports something).
 
     ScriptError, with the line that gave it away, for what is none of these. That a script is of a kind does not mean

@@ -214,7 +214,7 @@ class Desk:
         return path
 
     def read(self, name: Any) -> dict[str, Any]:
-        """A script, with what tells whether its file was changed since."""
+        """Return a script, with a stamp that shows later changes of its file."""
         path = self._path(name)
         try:
             if path.stat().st_size > LARGEST_SCRIPT:

@@ -44,10 +44,13 @@ _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the pa
 
 @dataclass(frozen=True)
 class Looks:
-    """panels: of PANELS, none: cracks, stress, and plastic strain and pressure of fluid where there is some, with heat
-    cracks, or without joints stress, and temperature; page: width [cm]; font and lines in points; dpi: dots per inch;
-    title: in the corner, with {step} and {time}; ranges: of the colours of panels, SI; those that are not given are
-    those of the frame."""
+    """Appearance of a figure of blocks.
+
+    panels: names of PANELS (default: cracks, stress, and if available plastic strain and fluid pressure; with heat
+    cracks, or without joints stress, and temperature); page: width [cm]; font: size and lines in points; dpi: dots per
+    inch; title: in the corner, with {step} and {time}; ranges: limits of the colours of panels in SI units (default:
+    those of the frame).
+    """
 
     panels: tuple[str, ...] = ()
     page: float = 17.0
@@ -61,7 +64,7 @@ USUAL = Looks()
 
 
 def view(state: MeshState) -> View:
-    """The part of the plane that holds a model, with some air."""
+    """Return the part of the plane that contains the model, with a margin."""
     if not len(state.points):
         return View(0.0, 1.0, 0.0, 1.0)
     low, high = state.points.min(axis=0), state.points.max(axis=0)
@@ -70,8 +73,9 @@ def view(state: MeshState) -> View:
 
 
 def view_of_flow(state: MeshState) -> View:
-    """The part of the plane where there is plastic strain, a bolt or a liner, and half of its width around it; the
-    whole model where that is hardly more."""
+    """Return the part of the plane with plastic strain, bolts or liners, enlarged by half of its width; the whole model
+    if that is hardly larger.
+    """
     from hpcdem.post.bolts import areas
 
     cells = state.cells[plastic_shear(state) > 0.01 * plastic_range(state)[1]]
@@ -84,7 +88,7 @@ def view_of_flow(state: MeshState) -> View:
 
 
 def view_of_fluid(state: MeshState) -> View:
-    """The part of the plane around channels."""
+    """Return the part of the plane around channels."""
     return _around(state, fluid.ends(state))
 
 
@@ -103,31 +107,31 @@ def _around(state: MeshState, there: np.ndarray) -> View:
 
 
 def compression(state: MeshState) -> np.ndarray:
-    """(ne,) larger compressive stress in the plane [Pa]: minus the smaller principal stress."""
+    """Return the larger compressive stress in the plane (ne,) [Pa], minus the smaller principal stress."""
     s = state.of_elements
     mean, half = 0.5 * (s["stress_xx"] + s["stress_yy"]), 0.5 * (s["stress_xx"] - s["stress_yy"])
     return -(mean - np.hypot(half, s["stress_xy"]))
 
 
 def plastic_shear(state: MeshState) -> np.ndarray:
-    """(ne,) shear of the plastic strain along its way; 0 where the frame has none."""
+    """Return the accumulated plastic shear strain (ne,); 0 if the frame has none."""
     return state.of_elements.get("plastic_shear_strain", np.zeros(len(state.cells)))
 
 
 def temperature(state: MeshState) -> np.ndarray:
-    """(n,) temperature of the corners; 0 where the frame has none."""
+    """Return the temperature of the corners (n,); 0 if the frame has none."""
     return state.of_points.get("temperature", np.zeros(len(state.points)))
 
 
 def temperature_range(state: MeshState) -> tuple[float, float]:
-    """Least and greatest temperature of the corners of elements."""
+    """Return the least and greatest temperature of the corners of elements."""
     values = temperature(state)[state.cells[state.cells >= 0]]
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
 
 
 def stress_range(state: MeshState) -> tuple[float, float]:
-    """Least and greatest compressive stress [Pa] without the extreme percent of the elements."""
+    """Return the least and greatest compressive stress [Pa] without the extreme percent of the elements."""
     values = compression(state)
     values = values[np.isfinite(values)]
     if not len(values):
@@ -146,8 +150,9 @@ def plastic_range(state: MeshState) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Contours:
-    """A panel with contours of what elements have, or their corners; units: from the largest value to size and name of
-    the unit."""
+    """A panel with contours of values of elements or of their corners; units: from the largest value to size and name
+    of the unit.
+    """
 
     values: Callable[[MeshState], np.ndarray]
     range: Callable[[MeshState], tuple[float, float]]
@@ -158,7 +163,7 @@ class Contours:
 
 
 def panels_of(state: MeshState) -> tuple[str, ...]:
-    """The panels that show what there is."""
+    """Return the default panels for the quantities of a frame."""
     wet = (TEMPERATURE,) * ("temperature" in state.of_points) + ("pressure",) * fluid.there(state)
     wet += ("concentration",) * fluid.with_proppant(state)
     if wet[:1] == (TEMPERATURE,) and plastic_range(state)[1] == 0.0:
@@ -179,7 +184,7 @@ def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) 
 
 
 def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
-    """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
+    """Return a matplotlib Figure with the panels, side by side for tall models, otherwise stacked."""
     from matplotlib.figure import Figure
 
     seen = replace(view(state) if seen is None else seen, system=state.units)
@@ -226,7 +231,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
 
 
 def panel(axes: Any, state: MeshState, seen: View, width: float, looks: Looks = USUAL) -> list[Any]:
-    """The cracks of a model in axes that are so wide [cm]; returns what a legend is made of."""
+    """Draw the cracks of a model in axes of a width [cm]; return the entries of a legend."""
     frame(axes, seen, looks, first=True, last=True)
     return _cracks(axes, state, width / seen.width)
 
@@ -249,7 +254,7 @@ def frame(axes: Any, seen: View, looks: Looks, first: bool, last: bool) -> None:
 
 
 def cracks(axes: Any, state: MeshState, font: float = 9.0, scale: float = 1.0) -> None:
-    """Elements coloured by group, and the joints that have yielded or broken. scale: cm on paper per metre."""
+    """Draw elements coloured by group, and joints that have yielded or broken. scale: cm on paper per metre."""
     handles = _cracks(axes, state, scale)
     if handles:
         axes.legend(
@@ -259,7 +264,7 @@ def cracks(axes: Any, state: MeshState, font: float = 9.0, scale: float = 1.0) -
 
 
 def rock(axes: Any, state: MeshState, edges: str) -> None:
-    """Elements coloured by group; edges: their colour, or "face"."""
+    """Draw elements coloured by group; edges: their colour, or "face"."""
     from matplotlib.collections import PolyCollection
 
     colour = _group_colours(state)
@@ -288,7 +293,7 @@ def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
 
 
 def supports(axes: Any, state: MeshState) -> list[Any]:
-    """Draw bolts and liners; returns what a legend is made of."""
+    """Draw bolts and liners; return the entries of a legend."""
     return bolts.draw(axes, state) + liners.draw(axes, state)
 
 
@@ -304,7 +309,7 @@ def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, f
 
 
 def _group_colours(state: MeshState) -> np.ndarray:
-    """A colour per element: by the set of groups that tells most of them apart."""
+    """A colour per element: by the set of groups that distinguishes most of them."""
     colour = np.full(len(state.cells), GROUPS[0], object)
     sets = [name for name in state.of_elements if name.startswith("group_")]
     best = max(sets, key=lambda name: len(np.unique(state.of_elements[name])), default=None)
@@ -315,7 +320,7 @@ def _group_colours(state: MeshState) -> np.ndarray:
 
 
 def line_width(state: MeshState, scale: float) -> float:
-    """Points: a seventh of an edge on paper, within what can be seen."""
+    """Return a line width in points: a seventh of an edge on paper, within visible limits."""
     return float(np.clip(_edge(state) * scale * CM * 72.0 / 7.0, 0.5, 1.6))
 
 
@@ -348,7 +353,9 @@ COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
 
 
 def coloured(axes: Any, state: MeshState, panel: str, span: tuple[float, float], scale: float) -> Any:
-    """One of them, colours from ... to ...; returns what the bar is made of. scale: cm on paper per metre."""
+    """Draw one of the panels with colours over a range `span`; return the artist of the colour bar. scale: cm on paper
+    per metre.
+    """
     shown = COLOURED[panel]
     if isinstance(shown, Contours):
         return contours(axes, state, shown, span)
@@ -357,7 +364,9 @@ def coloured(axes: Any, state: MeshState, panel: str, span: tuple[float, float],
 
 
 def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, float]) -> Any:
-    """Contours, colours from ... to ...; returns what the colour bar is made of. Broken joints are drawn over them."""
+    """Draw contours with colours over a range `span`, and broken joints over them; return the artist of the
+    colour bar.
+    """
     from matplotlib.tri import Triangulation
 
     if not len(state.cells):
@@ -377,7 +386,7 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
 
 
 def unit_of(shown: Contours | fluid.Shown, span: tuple[float, float], state: MeshState) -> tuple[float, str]:
-    """The unit in which values of this range are read best, in that of the model, and its name."""
+    """Return size and name of a suitable unit for values of this range, in the units of the model."""
     return units.on_bar(*span, units.label(state.units, shown.unit))
 
 
@@ -387,7 +396,7 @@ def titled(shown: Contours | fluid.Shown, span: tuple[float, float], state: Mesh
 
 
 def nice_levels(low: float, high: float) -> np.ndarray:
-    """About LEVELS round steps that hold the range from low to high."""
+    """Return about LEVELS round levels that cover the range from low to high."""
     spread = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     power = 10.0 ** math.floor(math.log10(spread / LEVELS))
     step = next(s * power for s in (1.0, 2.0, 2.5, 5.0, 10.0) if spread / (s * power) <= LEVELS)
@@ -396,7 +405,7 @@ def nice_levels(low: float, high: float) -> np.ndarray:
 
 
 def cornered(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles for contours of values (n,) at the corners of elements."""
+    """Return triangles for contours of values (n,) at the corners of elements."""
     quads = state.cells[state.cells[:, 3] >= 0]
     triangles = np.concatenate([state.cells[:, :3], quads[:, [0, 2, 3]]])
     a, b, c = (state.points[triangles[:, k]] for k in range(3))
@@ -405,8 +414,9 @@ def cornered(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def smoothed(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 2) at which corners meet, triangles (m, 3), and the values (ne,) of elements there: the mean of the
-    elements around, weighted by area."""
+    """Return points (n, 2) at which corners meet, triangles (m, 3), and nodal values: area-weighted means of the values
+    (ne,) of the elements around each point.
+    """
     cells, points = state.cells, state.points
     lowest, place = np.unique(spots(points, NEAR * _edge(state)), return_inverse=True)
     count = len(lowest)

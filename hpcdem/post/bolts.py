@@ -17,8 +17,9 @@ BROKEN = 16
 
 
 def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (m, 4, 2) [m] of the area beside each element of a bolt, from its bar out by its force, and the forces
-    (m,) [N]."""
+    """Return the areas that show axial force along bolt elements: corners (m, 4, 2) [m], with a width proportional to
+    the force, and the forces (m,) [N].
+    """
     nodes, elements = state.supports["bolts"]["nodes"], state.supports["bolts"]["elements"]
     at = np.column_stack([nodes["position_x"], nodes["position_y"]])
     first, force = elements["first_node"], elements["axial_force"]
@@ -35,7 +36,7 @@ def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
 
 
 def draw(axes: Any, state: MeshState) -> list[Any]:
-    """Draw the bolts of a frame; returns what a legend is made of, nothing without bolts."""
+    """Draw the bolts of a frame; return the entries of a legend, none without bolts."""
     if "bolts" not in state.supports:
         return []
     from matplotlib.collections import LineCollection, PolyCollection

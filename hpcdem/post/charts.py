@@ -41,8 +41,9 @@ def draw(
     model: MeshState | None = None,
     beside: str = "cracks",
 ) -> None:
-    """Draw (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks that are drawn
-    beside the diagram, as one of hpcdem.post.blocks.PANELS."""
+    """Draw curves (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks drawn
+    next to the diagram, as one of hpcdem.post.blocks.PANELS.
+    """
     import matplotlib
 
     matplotlib.use("Agg")

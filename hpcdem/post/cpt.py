@@ -37,8 +37,9 @@ _X11: dict[str, str | float] = {
 
 @dataclass(frozen=True)
 class Slice:
-    """Colours between two values, or of one value (low == high). label: its own text on the colour bar; annotated:
-    L, U or B where the table says which of its limits gets a number."""
+    """Colours between two values, or of one value (low == high). label: its text on the colour bar; annotated: L, U or
+    B if the table annotates its lower, upper or both limits.
+    """
 
     low: float
     high: float
@@ -50,8 +51,9 @@ class Slice:
 
 @dataclass(frozen=True)
 class ColourTable:
-    """Colours of numbers. below, above: red, green, blue (0..1) of values outside the slices; notes: what in the file
-    was understood but has no effect. NaN is never painted: a section is white where there is no material."""
+    """Colours of numbers. below, above: red, green, blue (0..1) of values outside the slices; notes: settings of the
+    file that have no effect. NaN is not painted: a section is white where there is no material.
+    """
 
     name: str
     slices: tuple[Slice, ...]
@@ -84,8 +86,9 @@ class ColourTable:
         return np.interp(values, self.breaks, n, left=np.nan, right=np.nan)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
-        """Red, green and blue (0..1) of values of any shape, (..., 3); NaN where nothing is to be painted, which is
-        where the value is NaN as well."""
+        """Return red, green and blue (0..1) of values of any shape, (..., 3); NaN where nothing is painted, as for
+        values that are NaN.
+        """
         values = np.asarray(values, dtype=float)
         if self.categorical:
             inside, place = self._category(values)
@@ -154,7 +157,7 @@ def from_rgb(colour: Sequence[float], model: str) -> tuple[float, ...]:
 
 
 def read_cpt(path: str | os.PathLike) -> ColourTable:
-    """The colour table in a file. Raises UsageError naming file and line."""
+    """Read the colour table of a file. Raises UsageError naming file and line."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
     except OSError as failure:
@@ -163,7 +166,7 @@ def read_cpt(path: str | os.PathLike) -> ColourTable:
 
 
 def parse_cpt(text: str, name: str = "colour table") -> ColourTable:
-    """The colour table in a text; `name` is for messages. Raises UsageError naming the line."""
+    """Parse the colour table in a text; `name` is for messages. Raises UsageError naming the line."""
     model, notes = _comments(text)
     slices: list[Slice] = []
     outside: dict[str, Colour] = {}

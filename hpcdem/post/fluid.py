@@ -18,8 +18,9 @@ LEAST = 0.3
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture of channels. column: of the frame; unit: of SI; dry: also dry channels have a value; colours: of
-    matplotlib, as they stand out from pale rock."""
+    """A picture of channels. column: of the frame; unit: in SI; dry: dry channels have a value too; colours: name in
+    matplotlib, chosen for contrast with pale rock.
+    """
 
     column: str
     unit: str
@@ -28,7 +29,7 @@ class Shown:
     colours: str
 
     def values(self, state: MeshState) -> np.ndarray:
-        """(nj,) of joints, else NaN."""
+        """Return the values of joints (nj,); NaN for joints that are not channels."""
         found = np.abs(state.of_joints.get(self.column, np.full(len(state.joints), np.nan)))
         if not self.dry and there(state):
             found = np.where(state.of_joints["saturation"] < WET, np.nan, found)
@@ -65,14 +66,15 @@ def with_proppant(state: MeshState) -> bool:
 
 
 def ends(state: MeshState) -> np.ndarray:
-    """(n, 2) of all channels [m]."""
+    """Return the end points (n, 2) of all channels [m]."""
     rows = np.isfinite(state.of_joints.get("aperture", np.full(len(state.joints), np.nan)))
     return state.points[state.joints[rows]].reshape(-1, 2)
 
 
 def draw(axes: Any, state: MeshState, shown: Shown, span: tuple[float, float], unit: float, width: float) -> Any:
-    """Draw the channels, colours from ... to ... in this unit; width: of the widest [points]. Returns what the colour
-    bar is made of, None without channels."""
+    """Draw the channels with colours over a range `span` in this unit; width: of the widest line [points]. Return the
+    artist of the colour bar, None without channels.
+    """
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 

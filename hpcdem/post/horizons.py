@@ -13,8 +13,9 @@ radii."""
 
 
 def horizons(g: Grains) -> dict[str, list[np.ndarray]]:
-    """Lines (n, 2) [m] by group, or by number of the colour; several where particles of a layer are missing in
-    between. Flying bits and particles that are held as walls are left out."""
+    """Return the top lines (n, 2) [m] of layers, by group or by number of the colour; several lines if particles of a
+    layer are missing in between. Detached particles and fixed ones that represent walls are ignored.
+    """
     bed = tops.bed(g.x, g.y, g.r, g.fixed) if len(g) else np.zeros(0, bool)
     named = sorted({name for name in g.group[bed].tolist() if name and name != "***"})
     layers = {name: bed & (g.group == name) for name in named}

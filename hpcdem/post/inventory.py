@@ -19,7 +19,7 @@ Facts = dict[str, Any]
 
 
 def of_file(path: Path) -> Facts:
-    """Facts about one file; nothing is raised for what is in it."""
+    """Return facts about a file; invalid contents raise no error."""
     facts: Facts = {"kind": "unknown file", "whole": False, "why": ""}
     try:
         status = path.stat()

@@ -27,8 +27,9 @@ BALL = 3.0
 
 @dataclass(frozen=True)
 class Look:
-    """palette (10, 3): colours by number; line: width of walls and of the surface in points; of_field: what colours
-    particles instead of their numbers."""
+    """Appearance of particles. palette (10, 3): colours by number; line: width of walls and of the surface in points;
+    of_field: field that colours particles instead of their numbers.
+    """
 
     palette: np.ndarray = field(default_factory=lambda: colours.RGB)
     line: float = 1.0
@@ -39,12 +40,12 @@ USUAL = Look()
 
 
 def balls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """Discs of true size in the manual's colours."""
+    """Draw filled discs of true size in the colours of the manual."""
     _discs(frame, ax, look, 0.0)
 
 
 def outlines(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """Circles of true size in the manual's colours."""
+    """Draw circles of true size in the colours of the manual."""
     _discs(frame, ax, look, 0.3)
 
 
@@ -62,7 +63,7 @@ def _discs(frame: Frame, ax: Any, look: Look, line: float) -> None:
 
 
 def coloured(frame: Frame, look: Look) -> Painted | None:
-    """The colours of particles by a field, None without one."""
+    """Return the colours of particles by a field, None without one."""
     if look.of_field is None:
         return None
     from hpcdem.post.view.moment import of_particles
@@ -72,7 +73,7 @@ def coloured(frame: Frame, look: Look) -> Painted | None:
 
 
 def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """Walls in their colours, and the sides of the BOX that are not the frame of the picture."""
+    """Draw walls in their colours, and the sides of the BOX that are not the frame of the picture."""
     p1, p2 = (np.asarray(frame.walls[p], dtype=float).reshape(-1, 2) for p in ("p1", "p2"))
     shown = np.ones(len(p1), bool)
     for axis, limits in enumerate((ax.get_xlim(), ax.get_ylim())):
@@ -86,7 +87,7 @@ def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """The line over the top of the model, without flying bits and particles that stand for walls."""
+    """Draw the surface line of the model, ignoring detached particles and particles that represent walls."""
     from hpcdem.post import surface as tops
 
     columns = frame.tables["particles"].columns
@@ -106,7 +107,7 @@ def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """Bonds from centre to centre: red in tension, blue in compression, dark without force."""
+    """Draw bonds from centre to centre: red in tension, blue in compression, dark without force."""
     table = frame.tables["bonds"].columns
     places, (first, second) = _ends(frame, "bonds")
     shades = np.where(table["fn"] < 0.0, TENSION, np.where(table["fn"] > 0.0, COMPRESSION, INK))
@@ -128,7 +129,7 @@ def bond_states(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """Contact forces from centre to centre; the thickest line is the largest force that only one in 200 exceeds."""
+    """Draw contact forces from centre to centre; the thickest line is the force that only one in 200 exceeds."""
     table = frame.tables["contacts"].columns
     places, (first, second) = _ends(frame, "contacts")
     size = np.hypot(table["fx"], table["fy"])
@@ -139,7 +140,7 @@ def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """The id in each particle; omitted where there are too many to be read."""
+    """Draw the id in each particle; omitted if there are too many to read."""
     columns = frame.tables["particles"].columns
     if len(columns["gid"]) > MOST_LABELS:
         return
@@ -148,7 +149,7 @@ def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """A radius in each particle, horizontal when it was made."""
+    """Draw a radius in each particle that was horizontal when the particle was created."""
     c = frame.tables["particles"].columns
     centre = np.stack([c["x"], c["y"]], axis=1)
     rim = centre + np.stack([c["radius"] * np.cos(c["angle"]), c["radius"] * np.sin(c["angle"])], axis=1)
@@ -156,7 +157,7 @@ def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
 
 
 def mesh(frame: Frame, ax: Any, look: Look = USUAL) -> None:
-    """A square grid of twice the largest diameter, about the cells in which neighbours are searched."""
+    """Draw a square grid of twice the largest diameter, approximately the cells of the neighbour search."""
     radius = frame.tables["particles"].columns["radius"]
     if not len(radius):
         return

@@ -21,9 +21,10 @@ _warned: set[str] = set()
 
 
 def lettered(figure: Any, kind: str = "png") -> str:
-    """Give texts of a figure of matplotlib, that becomes a file of this kind, fonts that have their letters; what is to
-    be reported about those that no font has, "" if all are available. It goes to standard error too, once in a
-    process, and into the figure, but for SVG, whose texts are written by who reads it."""
+    """Give the texts of a matplotlib figure fonts that have all their letters. Return a message about letters that no
+    font has, "" if all are available. The message is also written once per process to standard error, and into the
+    figure except for SVG, whose viewer chooses fonts.
+    """
     from matplotlib.font_manager import findfont
     from matplotlib.patheffects import Normal
     from matplotlib.text import Text

@@ -17,8 +17,9 @@ DELETED = 32
 
 
 def areas(state: MeshState, first: str, last: str) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (m, 4, 2) [m] of the area beside each element, from the beam out by its values at both ends, positive
-    ones away from the rock, and these values (m, 2); first, last: names of the quantities."""
+    """Return the areas that show a quantity along liner elements: corners (m, 4, 2) [m], with widths proportional to
+    the values at both ends, positive away from the rock, and these values (m, 2); first, last: names of the quantities.
+    """
     nodes, elements = state.supports["liners"]["nodes"], state.supports["liners"]["elements"]
     there = elements["liner_state"].astype(np.int64) & DELETED == 0
     at = np.column_stack([nodes["position_x"], nodes["position_y"]])
@@ -42,7 +43,8 @@ def areas(state: MeshState, first: str, last: str) -> tuple[np.ndarray, np.ndarr
 
 def draw(axes: Any, state: MeshState) -> list[Any]:
     """Draw the liners of a frame: axial force away from the rock, whatever its sign, moment on the side in tension.
-    Returns what a legend is made of, nothing without liners."""
+    Return the entries of a legend, none without liners.
+    """
     if "liners" not in state.supports:
         return []
     from matplotlib.collections import LineCollection, PolyCollection

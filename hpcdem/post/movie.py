@@ -24,9 +24,9 @@ _RIMS = 0.0, 0.35, 0.65
 
 
 def pages(folder: str | os.PathLike, without: Collection[str] = ()) -> list[Path]:
-    """The numbered pictures *.jpg of a folder in the order of time, as `frames.list_frames`; the most frequent
-    kind where there are several. without: names of frames whose pictures do not count. Raises HpcdemError without
-    frames."""
+    """Return the numbered pictures *.jpg of a folder in the order of time, as `frames.list_frames`; the most frequent
+    kind if there are several. without: names of frames whose pictures are ignored. Raises HpcdemError without frames.
+    """
     try:
         names = sorted(os.listdir(folder))
     except OSError as failure:
@@ -45,12 +45,11 @@ def pages(folder: str | os.PathLike, without: Collection[str] = ()) -> list[Path
 def write_gif(
     pictures: Sequence[Path], path: str | os.PathLike, fps: float, width: int | None = None, keep: Sequence[str] = ()
 ) -> Path:
-    """An animated GIF that repeats without end. Raises HpcdemError.
+    """Write an animated GIF that repeats endlessly. Raises HpcdemError.
 
-    keep: colours "#rrggbb" of thin lines, which are kept however few their pixels are.
-
-    width: of the film [pixels], by default that of the widest picture. One palette for all frames, in which the
-    colours of particles are exact. A frame that equals the one before makes that one last longer.
+    keep: colours "#rrggbb" of thin lines that stay in the palette even if they have few pixels; width: of the film
+    [pixels] (default: that of the widest picture). All frames share one palette, in which the colours of particles are
+    exact. A frame equal to the previous one extends its duration.
     """
     size = film_size(pictures, width)
     palette = _palette([_fitted(p, size) for p in _some(pictures)], keep)
@@ -68,7 +67,7 @@ def write_gif(
 
 
 def write_mp4(pictures: Sequence[Path], path: str | os.PathLike, fps: float, width: int | None = None) -> Path:
-    """An MP4 (H.264, or MPEG-4 from an ffmpeg without it). Raises HpcdemError, also where there is no ffmpeg."""
+    """Write an MP4 (H.264, or MPEG-4 with an ffmpeg without it). Raises HpcdemError, also without ffmpeg."""
     program = ffmpeg()
     if program is None:
         raise HpcdemError(
@@ -90,7 +89,7 @@ def write_mp4(pictures: Sequence[Path], path: str | os.PathLike, fps: float, wid
 def _encode(
     program: str, pictures: Sequence[Path], size: tuple[int, int], fps: float, codec: list[str], path: str
 ) -> str | None:
-    """Feed ffmpeg; the last line it said if it failed."""
+    """Feed ffmpeg; return its last line of output if it failed."""
     command = [
         program, "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
         "-r", f"{fps:g}", "-i", "-", *codec, "-threads", "1", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
@@ -117,7 +116,7 @@ def _encode(
 
 
 def ffmpeg() -> str | None:
-    """The program ffmpeg: of the PATH, or of the package imageio-ffmpeg."""
+    """Return the path of ffmpeg: from PATH, or from the package imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found is None:
         try:
@@ -130,7 +129,7 @@ def ffmpeg() -> str | None:
 
 
 def film_size(pictures: Sequence[Path], width: int | None = None) -> tuple[int, int]:
-    """Width and height [pixels] that hold all pictures, each scaled to the width."""
+    """Return width and height [pixels] that contain all pictures, each scaled to the width."""
     from PIL import Image
 
     sizes = []

@@ -58,7 +58,7 @@ class Style:
     title: str | None = None  # {step} and {time} are those of the frame
 
     def ticks(self, seen: View) -> tuple[Ticks, Ticks]:
-        """The ticks along both axes. Raises UsageError for more than anyone can read."""
+        """Return the ticks along both axes. Raises UsageError for more than are readable."""
         major, minor = self.major, self.minor
         if self.usual_ticks and major is None and MAJOR <= max(seen.width, seen.height) <= _LARGE:
             x, y = seen.ticks(MAJOR, MINOR if minor is None else minor)
@@ -75,7 +75,7 @@ USUAL_STYLE = Style()
 
 
 def seen_of(frame: Frame, style: Style) -> View:
-    """The part of the moved plane that a picture shows. Raises UsageError where the limits leave nothing."""
+    """Return the part of the moved plane that a picture shows. Raises UsageError if the limits contain nothing."""
     seen = view(frame).moved(*style.move)
     sides = {"left": seen.left, "right": seen.right, "bottom": seen.bottom, "top": seen.top}
     if style.from_zero:
@@ -94,7 +94,7 @@ def seen_of(frame: Frame, style: Style) -> View:
 
 
 def moved(frame: Frame, x: float, y: float) -> Frame:
-    """The frame as far as it can be drawn, everything moved by (x, y)."""
+    """Return the drawable parts of the frame, moved by (x, y)."""
     tables = dict(frame.tables)
     columns = dict(tables["particles"].columns)
     columns |= {name: columns[name] + d for name, d in (("x", x), ("y", y)) if name in columns}
@@ -142,7 +142,7 @@ def _draw_axes(ax: Any, seen: View, style: Style) -> None:
 def frame_figure(
     frame: Frame, what: Sequence[str] = MODEL, style: Style = USUAL_STYLE, seen: View | None = None
 ) -> Any:
-    """A matplotlib Figure of the frame, as wide as a page; as high as it must be, or narrower if too high."""
+    """Return a matplotlib Figure of the frame, as wide as a page; narrower if it would be too high."""
     from matplotlib.figure import Figure
 
     seen = replace(seen_of(frame, style) if seen is None else seen, system=str(frame.settings.get("units", "")))
@@ -183,7 +183,7 @@ def plot_frame(
 
 
 def plot_file(source: Path, path: Path, style: Style, seen: View | None = None) -> None:
-    """Draw the frame in a file with all that `style` says. Serial. Raises HpcdemError."""
+    """Draw the frame of a file in a style. Serial. Raises HpcdemError."""
     tables = ["particles", *(("contacts", "bonds") if {"bondplot", "bondc", "cforce"} & {*style.what} else ())]
     if style.look.of_field is not None:  # stress comes from all of them
         tables = ["particles", "contacts", "bonds", "wall_contacts"]

@@ -39,8 +39,9 @@ def write(make: Callable[[], Any], path: str | os.PathLike, dpi: float) -> Path:
 
 
 def save(figure: Any, target: str | IO[bytes], kind: str, dpi: float, picture: object = "the picture") -> None:
-    """Write a figure of matplotlib as jpg, png, tiff, pdf, svg or eps. picture: what a message calls it. HpcdemError
-    for more pixels than can be."""
+    """Write a matplotlib figure as jpg, png, tiff, pdf, svg or eps. picture: its name in messages. HpcdemError for too
+    many pixels.
+    """
     import matplotlib
 
     width, height = (float(side) * dpi for side in figure.get_size_inches())

@@ -14,7 +14,7 @@ HELD = FIX_X | FIX_Y
 
 
 def held_fast(columns: Mapping[str, np.ndarray], n: int) -> np.ndarray:
-    """(n,): which particles of a frame are fixed along x and y, as rows of particles are that stand for walls."""
+    """Return flags (n,) of the particles of a frame that are fixed along x and y, as rows that represent walls are."""
     return (np.asarray(columns.get("fix", np.zeros(n)), dtype=np.int64) & HELD) == HELD
 
 

@@ -9,10 +9,10 @@ FINE, LEVELS = 48, 3
 
 
 def top(at: np.ndarray, radius: float, discs: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Heights (n,) [m] at which the centre of a disc of this radius stops that falls at x = at (n,).
+    """Return the heights (n,) [m] at which the centre of a disc of this radius stops when it falls at x = at (n,).
 
-    discs: (m, 3) x, y, r; walls: (k, 4) x1 y1 x2 y2. Flat walls carry it; steep ones, which are as tall as anybody
-    may think, keep it at its radius (inf). -inf where nothing stops it.
+    discs: (m, 3) x, y, r; walls: (k, 4) x1 y1 x2 y2. Flat walls support the disc; steep ones, regarded as infinitely
+    high, keep it at a distance of its radius (inf). -inf where nothing stops it.
     """
     height = np.full(len(at), -np.inf)
     if len(discs):
@@ -40,8 +40,9 @@ def is_steep(x1: float, y1: float, x2: float, y2: float) -> bool:
 def resting(
     left: float, right: float, radius: float, discs: np.ndarray, walls: np.ndarray
 ) -> tuple[float, float] | None:
-    """Centre of a disc in the lowest hollow between two positions, in contact and without overlap; the lowest place
-    where there is no hollow, None where nothing carries it."""
+    """Return the centre of a disc in the lowest hollow between two positions, in contact and without overlap; without a
+    hollow the lowest position, None if nothing supports it.
+    """
     near = discs[(discs[:, 0] > left - discs[:, 2] - radius) & (discs[:, 0] < right + discs[:, 2] + radius)]
     at = np.linspace(left, right, FINE + 1)
     height = top(at, radius, near, walls)

@@ -8,9 +8,9 @@ import numpy as np
 
 
 def row(p1: tuple[float, float], p2: tuple[float, float], rad: float, cratio: float) -> np.ndarray:
-    """Centres (n, 2) [m] at P1 + k s e, s = 2 rad cratio, k = 0 .. floor(|P2 - P1| / s + 1e-9).
+    """Return the centres (n, 2) [m] at P1 + k s e, s = 2 rad cratio, k = 0 .. floor(|P2 - P1| / s + 1e-9).
 
-    The first centre is P1 itself: only so do published states of ZDEM stand in equilibrium.
+    The first centre is P1 itself; only then are published states of ZDEM in equilibrium.
     """
     spacing = 2.0 * rad * cratio
     length = math.dist(p1, p2)

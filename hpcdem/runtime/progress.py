@@ -177,7 +177,8 @@ class Log:
 
     def warn(self, text: str) -> None:
         """A line that starts with ``warning:``. Of those that differ in numbers alone the first three are written, then
-        the tenth, the hundredth ... with their count; `close` tells how many there were."""
+        the tenth, the hundredth ... with their count; `close` logs their total number.
+        """
         kind = _NUMBERS.sub("#", text)
         count = self._warnings[kind] = self._warnings.get(kind, 0) + 1
         if not self.folds or count <= FOLDED_AFTER:

@@ -1,4 +1,4 @@
-"""`--check-reproducible N [--against LOG]`: lines in the log that stand for the state, and their comparison.
+"""`--check-reproducible N [--against LOG]`: fingerprints of the state in the log, and their comparison.
 
 A line is made every N steps: ``state 2000: particles=<32 digits> contacts=<32 digits> walls=<32 digits>``. Two runs
 that print the same lines had the same bits, on however many ranks and threads. Several simulations of a program are
@@ -27,7 +27,7 @@ def line(step: int, model: int, parts: Mapping[str, str]) -> str:
 
 
 def read(path: Path) -> States:
-    """The states that a log tells of; of a step that it tells of twice (a run that went on from a checkpoint) the last.
+    """Return the states recorded in a log; of a step recorded twice (by a run that resumed from a checkpoint) the last.
 
     UsageError if it cannot be read or has no such lines.
     """

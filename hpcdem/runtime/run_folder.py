@@ -215,7 +215,7 @@ def _step_of(path: Path) -> int:
 
 @cache
 def _time_of(path: Path, stamp: int) -> float:
-    """Model time [s] of a checkpoint of this run; looked up once. stamp: of the file, another one is read again."""
+    """Model time [s] of a checkpoint of this run; read once. stamp: of the file, another one is read again."""
     from hpcdem.io import checkpoint  # not before the environment of HDF5 is settled
 
     return float(checkpoint.read_state(path)["clock"]["time"])

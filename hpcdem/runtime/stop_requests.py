@@ -153,8 +153,9 @@ class StopRequests:
         self._stop = self._stop or ("Ctrl-C" if name == "SIGINT" else name)
 
     def _wait_for_a_command(self) -> None:
-        """A script in a loop of its own never looks at flags: look at it from time to time. Where it uses the alarm
-        itself it must be interrupted a second time."""
+        """A script in its own loop never checks flags: check it at intervals. Where it uses the alarm itself it must be
+        interrupted a second time.
+        """
         number = getattr(signal, "SIGALRM", None)
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, None):
             self._before[number] = signal.signal(number, self._on_alarm)

@@ -141,13 +141,13 @@ class Sweep:
 
         Parameters
         ----------
-        what : kinds of measurements; all that the folders allow if empty.
-        formats : of the figures.
-        options : those of `hpcdem measure`, as `--strain`: strain=0.3.
+        what : kinds of measurements (default: all that the folders allow).
+        formats : file formats of the figures.
+        options : options of `hpcdem measure`, for example `--strain` as strain=0.3.
 
         Returns
         -------
-        Report : the tables.
+        Report : tables of the report.
         """
         for name in options:
             if name not in Options.__annotations__:

@@ -94,8 +94,9 @@ class _Driver:
         return {member.name: member.state for member in self.plan.members}
 
     def _poll(self) -> None:
-        """Note what has ended, and start what there is room for. A member that was started by an earlier call takes
-        its room too."""
+        """Record members that have ended, and start as many as the limit allows. Members started by an earlier call
+        count too.
+        """
         busy = 0
         for member in list(self.open):
             process = self.mine.get(member.name)

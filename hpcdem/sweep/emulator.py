@@ -1,4 +1,4 @@
-"""A Gaussian process that stands for a measured number between the runs of a sweep.
+"""A Gaussian process that interpolates a measured number between the runs of a sweep.
 
 Matern kernel of 5/2 with a length for each parameter, and the noise of the seeds, both by the largest marginal
 likelihood (Rasmussen & Williams 2006, Gaussian Processes for Machine Learning, eqs. 2.25, 2.26, 4.17, 5.8). SciPy does
@@ -35,7 +35,7 @@ class Emulator:
 
 
 def fit(points: np.ndarray, values: np.ndarray, starts: int = 4, seed: int = 0) -> Emulator:
-    """The process through values (n,) at points (n, d); repeated points tell its noise."""
+    """The process through values (n,) at points (n, d); repeated points define its noise."""
     mean, scale = float(values.mean()), float(values.std()) or 1.0
     y = (values - mean) / scale
     d = points.shape[1]

@@ -46,8 +46,9 @@ def command(plan: Plan, again: bool) -> list[str]:
 
 
 def _locked(plan: Plan, member: Member) -> FolderLock:
-    """The lock of its folder. UsageError if it runs already. Whoever only looks holds the lock for a moment: so once
-    more after that."""
+    """The lock of its folder. UsageError if it runs already. A process that only inspects the folder holds the lock
+    briefly, so a failed attempt is repeated once.
+    """
     for _ in range(3):
         try:
             return FolderLock(member.folder, {"host": socket.gethostname(), "pid": os.getpid()})

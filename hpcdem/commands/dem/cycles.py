@@ -289,7 +289,8 @@ def _is_surely_small(sim: Simulation) -> bool:
 
 def _watch_the_time_step(sim: Simulation) -> None:
     """dt beside its limits while contacts form; a line whenever these have come down by a fifth. The more the stiffness
-    may grow until dt comes near them, the later the next look. Collective."""
+    may grow until dt comes near them, the later the next check. Collective.
+    """
     step = sim.clock.step
     if sim.step_limit > 0.0 and step >= sim.next_watch:
         critical = diagnostics.critical_dt(sim)

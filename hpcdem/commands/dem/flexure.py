@@ -1,4 +1,4 @@
-"""FLEXURE: a base that gives way under its load, as an elastic plate on a fluid (flexural isostasy)."""
+"""FLEXURE: a base that bends under its load like an elastic plate on a fluid (flexural isostasy)."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def surface(
     deposit, below : rate of deposition [m/s], and the level up to which it acts [m]; a level alone: each application
         deposits a layer as thick as a column is wide, until the level is reached.
     rise : upward velocity of the levels, from the command on [m/s].
-    years : years that a second of the model stands for; diffuse, erode, deposit and rise are then per year.
+    years : years represented by a second of model time; diffuse, erode, deposit and rise are then per year.
     only : groups whose discs may be eroded; other groups protect what lies below them (default: all).
     rad : radii of deposited discs, drawn at random; a repeated one is more likely [m].
     porosity : porosity of eroded and deposited material: bulk area = area of discs / (1 - porosity) (default: 0.15).
@@ -195,7 +195,7 @@ def _colors(colors: Sequence[str]) -> tuple[int, ...]:
 
 
 def _refuse_contradictions(sim: Simulation, id: int, land: Land) -> None:
-    """CommandError where another process lays down what this one removes, or the other way round."""
+    """Raise CommandError if one process deposits what another one erodes."""
     for other, active in sim.lands.items():
         apart = land.x is not None and active.x is not None and (land.x[1] <= active.x[0] or active.x[1] <= land.x[0])
         for one, two in ((land, active), (active, land)):

@@ -27,8 +27,9 @@ LAST = 2**53
 
 
 class Call:
-    """A command on its way to its function: its row, arguments with all expressions evaluated, by name; where: its
-    range; restore_names: puts the names and functions of a checkpoint (of this file) into the script."""
+    """A command to be passed to its function: its row, arguments with all expressions evaluated, by name; where: its
+    range; restore_names: puts the names and functions of a checkpoint (of this file) into the script.
+    """
 
     def __init__(
         self, project: Project, command: Command, arguments: Mapping[str, Any], where: g.Range | None,

@@ -71,7 +71,7 @@ class Console:
         return bool(script.statements)
 
     def show(self) -> Path | None:
-        """Write the present state where pages look for it; its path, None if there is nothing yet."""
+        """Write the present state for pages to read. Return its path, None without a model."""
         from hpcdem.commands import present  # brings kernels with it
 
         return present.blocks(self.interpreter.project)

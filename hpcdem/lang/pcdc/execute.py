@@ -159,8 +159,9 @@ class Interpreter:
             raise self.journal.failure
 
     def _explained(self, error: BaseException, script: Source) -> HpcdemError:
-        """An error of Python: of an expression in a command with the line of it, any other with its way through the
-        script."""
+        """An error of Python: of an expression in a command with the line of it, any other with its traceback through
+        the script.
+        """
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in self.sources]
         if frames:
             last = frames[-1]
@@ -238,7 +239,7 @@ class Interpreter:
     # ---- continuing from a checkpoint ------------------------------------------------------------------------------
 
     def _passed_over(self, statement: Statement, arguments: Mapping[str, Any], text: str) -> bool:
-        """Note a command, or, on the way back to a checkpoint, pass over it if it was done before that was written."""
+        """Record a command, or, during the replay of a script, skip it if it was executed before the checkpoint."""
         journal = self.journal
         if journal is None:
             return False
@@ -269,7 +270,7 @@ class Interpreter:
 
     @property
     def replays(self) -> bool:
-        """The script is on its way back to a checkpoint."""
+        """True while the script is replayed up to a checkpoint."""
         return self.journal is not None and self.journal.replays
 
     @property
@@ -389,7 +390,7 @@ class Interpreter:
             self._agree(len(self.statements), "")
 
     def _with_calls(self, error: ScriptError) -> ScriptError:
-        """The error with the calls that led to its line, if it stands in a function."""
+        """The error with the calls that led to its line, if it is in a function."""
         places: list[tuple[str, int]] = []
         frame: FrameType | None = sys._getframe(1)
         while frame is not None:
@@ -431,7 +432,7 @@ class Interpreter:
     # ---- the log -------------------------------------------------------------------------------------------------
 
     def _print(self, *values: Any, file: Any = None, **how: Any) -> None:
-        """print of the script: rank 0 speaks for all."""
+        """Replace print of the script: only rank 0 prints."""
         if file is not None and file is not sys.stdout:
             print(*values, file=file, **how)
         elif self.project.comm.rank == 0 and not (self.journal is not None and self.journal.replays):

@@ -67,7 +67,7 @@ class Journal:
             self.entries.append(list(entry))
 
     def note_error(self, error: HpcdemError) -> None:
-        """A command or look failed; the script may catch it and continue."""
+        """Record that a command or query failed; the script may catch the error and continue."""
         if isinstance(error, ScriptError):
             self.note(ERROR, "ScriptError", error.file, error.line, error.message)
         elif type(error).__name__ in _ERRORS:

@@ -71,7 +71,7 @@ def _number(value: float) -> float | str:
 
 
 def _text(name: str, function: FunctionType, sources: Mapping[str, Source]) -> str:
-    """The def of a function as it stands in its script."""
+    """Return the def of a function as written in its script."""
     code = function.__code__
     source = sources.get(code.co_filename)
     if source is not None:

@@ -280,7 +280,7 @@ class _Line:
         return given
 
     def _may_be(self, kind: kinds.Kind) -> bool:
-        """A value follows, or a word that stands for one."""
+        """Return whether a value, or a word that represents one, follows."""
         token = self.peek()
         return self._value_follows() or (isinstance(token, Word) and token.text.lower() in kind.words)
 

@@ -42,7 +42,7 @@ class Source:
         return self.lines[number - 1].strip() if 0 < number <= len(self.lines) else ""
 
     def statement_at(self, number: int) -> Statement | None:
-        """The command that stands on this line."""
+        """Return the command on this line."""
         return next((s for s in self.statements if s.line <= number <= s.last_line), None)
 
 
@@ -212,8 +212,9 @@ def _check_python(source: Source) -> None:
 
 
 def too_deep(source: Source, reads: Callable[[str], object] = ast.parse) -> ScriptError:
-    """The error for Python that is nested too deeply for `reads`, with the first line at which it is: Python itself
-    does not tell."""
+    """The error for Python that is nested too deeply for `reads`, with the first such line, which Python itself does
+    not report.
+    """
 
     def fails(count: int) -> bool:
         try:

@@ -1,6 +1,5 @@
-"""`pcdc` in the Python of a script: what the model is like now.
-
-Every look is collective: all ranks must come to it, as they come to commands.
+"""`pcdc` in the Python of a script: queries of the present model. Every query is collective: all ranks must execute it,
+as they do commands.
 """
 
 from __future__ import annotations
@@ -93,8 +92,9 @@ class Model(Accounts):
 
     @property
     def solved(self) -> dict[str, Any]:
-        """Outcome of the last `model solve`: "reason" (ratio, cycles, time; without equilibrium: no progress,
-        limit, runaway), "ratio" at the end (NaN if nobody looked), "steps" it took. Empty before the first."""
+        """Outcome of the last `model solve`: "reason" (ratio, cycles, time; without equilibrium: no progress, limit,
+        runaway), "ratio" at the end (NaN if not evaluated), "steps" it took. Empty before the first.
+        """
         return self._look(lambda: dict(self._project.solved))
 
     @property

@@ -1,4 +1,4 @@
-"""``hpcdem --check script``: what a script would do, told without doing it.
+"""``hpcdem --check script``: reports what a script would do, without running it.
 
 Particle numbers, file sizes and times are estimates, meant for choosing a machine and a disk.
 """

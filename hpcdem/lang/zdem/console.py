@@ -60,7 +60,7 @@ class Conversation:
         return True
 
     def show(self) -> Path | None:
-        """Write the present state where pages look for it; its path, None if there is nothing yet."""
+        """Write the present state for pages to read. Return its path, None without a model."""
         from hpcdem.commands import present  # brings kernels with it
 
         return None if self.sim is None else present.particles(self.sim)

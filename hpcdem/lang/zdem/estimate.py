@@ -79,7 +79,7 @@ def kind_of(statements: Sequence[Statement]) -> str:
 
 
 class _Follower:
-    """The model as far as it is guessed: a settled bed, layers that still fall, and particles that stand for good."""
+    """The model as estimated: a settled bed, layers that still fall, and particles that never move."""
 
     def __init__(self, directory: Path, restored: Mapping[str, Any] | None, kind: str) -> None:
         self.directory, self.restored = directory, restored

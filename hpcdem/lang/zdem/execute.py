@@ -21,7 +21,7 @@ from hpcdem.lang.zdem.table import ZDEM
 
 
 def refuse_unexecuted(statements: Sequence[Statement]) -> None:
-    """ScriptError at the first line that asks for something the solver cannot do, before anything has run."""
+    """ScriptError at the first line that requests something the solver does not support, before anything runs."""
     for statement in statements:
         if statement.unexecuted:
             raise ScriptError(
@@ -238,7 +238,9 @@ class _Call:
         return str(self.directory / self.arguments["file"])
 
     def existing(self, word: str = "file") -> str:
-        """A file to read: beside the script, then in ./data below it. Rank 0 looks, so that all ranks agree."""
+        """Find a file to read: next to the script, then in ./data below it. Rank 0 searches, so that all ranks
+        agree.
+        """
         comm = getattr(self.sim, "comm", None)
         found = find(self.directory, self.arguments[word]) if comm is None or comm.rank == 0 else None
         found = comm.bcast(found) if comm is not None else found

@@ -21,7 +21,7 @@ _USE = re.compile(r"\{([A-Za-z_]\w*)\}", re.ASCII)
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number with a name. token: the number as it stands in the script."""
+    """A number with a name. token: the number as written in the script."""
 
     name: str
     token: Token

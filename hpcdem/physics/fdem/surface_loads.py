@@ -19,8 +19,9 @@ SHARED_OUT = ("flow_nodes", "proppant_nodes", "fluid_heat")
 
 
 class SurfaceLoad(ABC):
-    """Interface of a load on the surfaces of blocks; `name` is one of ORDER; of_mesh: it goes with the mesh that it was
-    made for."""
+    """Interface of a load on the surfaces of blocks; `name` is one of ORDER; of_mesh: it is removed with the mesh for
+    which it was made.
+    """
 
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False

@@ -74,8 +74,9 @@ class FlowAssignments(Assigned, Field):
     # ---- channels ----------------------------------------------------------------------------------------------------
 
     def assign(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
-        """Joints (None: all) are channels with these properties. Fluid that has no room any more goes with it; new room
-        is dry."""
+        """Make joints (None: all) channels with these properties. Fluid of volume that disappears is removed; new
+        volume is dry.
+        """
         at = self._numbers(joints)
         if not len(at):
             raise CommandError("no joint here can be a channel")

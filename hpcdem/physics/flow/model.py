@@ -72,8 +72,7 @@ class Flow(Values):
         return account.closed(self.energy)
 
     def fill(self, nodes: np.ndarray | None, pressure: float | None = None, saturation: float | None = None) -> None:
-        """Flow nodes among these points (None: all) hold fluid of this pressure [Pa], or fill this part of their
-        room."""
+        """Flow nodes among these points (None: all) contain fluid at this pressure [Pa], or at this saturation."""
         if (pressure is None) == (saturation is None):
             raise CommandError("give either a pressure or a saturation")
         given = pressure if saturation is None else saturation
@@ -303,7 +302,9 @@ class Flow(Values):
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
-        """Channels with their properties, prescribed nodes, and faces said to be wet, of all ranks; see `condensed`."""
+        """Channels with their properties, prescribed nodes, and faces assigned as wet, of all ranks; see
+        `condensed`.
+        """
         channels, faces = assigned.numbered(self.row), np.flatnonzero(self.wet_bits)
         at = {} if self.condensed is None else {"flow_condensed": dict(zip("xyz", self.condensed.T))}
         return at | {

@@ -1,4 +1,4 @@
-"""Wells: flow nodes that are one room, into which fluid is pumped, or out of which it is drawn, by stages.
+"""Wells: flow nodes that share one volume, into which fluid is pumped, or from which it is produced, in stages.
 
 The nodes of a well share one head: those of a hole without gravity have one pressure, with gravity it grows downwards;
 the pressure of a well is that at its highest node. All ranks hold all wells, and compute them from sums over their

@@ -73,7 +73,7 @@ class Implicit:
         self._settle(before)
 
     def steady(self) -> None:
-        """The state to which heat goes with the conditions of this moment; no time passes."""
+        """Compute the steady state under the present conditions; no time passes."""
         self._refuse_loose()
         self._settle(self._solve(math.inf))
 

@@ -128,7 +128,7 @@ class Liners(Structure):
         return numbers
 
     def _check(self, faces: np.ndarray) -> None:
-        """CommandError unless these faces are free and bear no liner yet."""
+        """Raise CommandError unless these faces are free and have no liner yet."""
         blocks = self.blocks
         partner = blocks.partner[faces]
         beside = (partner >= 0) & blocks.alive[partner // 4]

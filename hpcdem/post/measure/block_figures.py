@@ -31,7 +31,7 @@ FRAGMENT_COLOURS = (
 
 
 def times(values: np.ndarray, timed: bool) -> tuple[np.ndarray, str]:
-    """Places on the axis of time and its name, µs to years; steps if the time is constant."""
+    """Return values on the time axis and its label, µs to years; steps if the time is constant."""
     if not timed:
         return values / 1000.0, "thousand steps"
     largest = float(np.abs(values).max(initial=0.0))
@@ -93,7 +93,7 @@ class _Maps:
         return self.figure.add_axes((x / w, BOTTOM / h, width / w, part * self.height / h))
 
     def legend(self, handles: Sequence[Any]) -> None:
-        """A line over the maps, what it stands for being in the first."""
+        """Draw a line over the maps; the first one has its legend."""
         w, h = self._page
         place = self.maps[0].get_position().x0, (BOTTOM + self.height + 0.45) / h
         self.figure.legend(
@@ -124,8 +124,9 @@ def _elements(axes: Any, state: MeshState, colour: Any = PALE, edges: Any = "fac
 
 
 def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> Any:
-    """Broken joints by mode (of the events, which are finer than the frames, if there are any) and damage over time;
-    below, where they are in the last frame, by mode and by time."""
+    """Draw broken joints by mode (from the events, if available, which are finer than the frames) and damage over time;
+    below, the broken joints of the last frame by mode and by time.
+    """
     timed = "break_time" in state.of_joints and bool((state.of_joints["state"] == blocks.BROKEN).any())
     sheet = _Maps(state, [4.6, 3.6], [GAP, LOWER_GAP + LEGEND], 2 if timed else 1)
     _crack_curves(sheet.panels, parts, events, "length")
@@ -172,8 +173,9 @@ STEREONET = 6.0
 
 
 def cracks_in_space(parts: Sequence[Part], state: MeshState, rows: np.ndarray, events: Events | None) -> Any:
-    """Broken joints by mode and damage over time; below, of the broken ones of the last frame (rows of joints) the
-    middles, seen along the axis of which the body has least, and the poles in a stereonet."""
+    """Draw broken joints by mode and damage over time; below, the centres of the broken joints of the last frame (rows
+    of joints), seen along the shortest axis of the body, and their poles in a stereonet.
+    """
     figure, (a, b, low) = page([4.6, 3.6, STEREONET], [GAP, LOWER_GAP])
     _crack_curves((a, b), parts, events, "area")
     corners = state.points[state.joints[rows, :3]]
@@ -264,7 +266,7 @@ def _by_time(sheet: _Maps, state: MeshState) -> None:
 
 
 def fragments(parts: Sequence[Part], state: MeshState) -> Any:
-    """Number of fragments and share of the largest over time; distribution of sizes; the last frame."""
+    """Draw number of fragments and share of the largest over time; distribution of sizes; the last frame."""
     from matplotlib import colormaps
 
     flat = state.points.shape[1] == 2
@@ -319,7 +321,7 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
 
 
 def regions(parts: Sequence[Part]) -> Any:
-    """Mean stress of every region over time; components of stress and of strain of the last of them."""
+    """Draw the mean stress of every region over time; components of stress and of strain of the last region."""
     figure, axes = page([4.2, 4.6, 4.6], [GAP, GAP])
     at, axis = when(parts)
     series: dict[tuple[str, str], list[tuple[float, bodies.Region]]] = {}
@@ -349,7 +351,7 @@ def regions(parts: Sequence[Part]) -> Any:
 
 
 def displacement(parts: Sequence[Part]) -> Any:
-    """The largest displacement of the surface, and the least and the greatest of each component, over time."""
+    """Draw the largest displacement of the surface, and the least and the greatest of each component, over time."""
     figure, axes = page([4.6, 5.2], [GAP])
     at, axis = when(parts)
     kept = [k for k, one in enumerate(parts) if one.surface is not None and len(one.surface.node)]
@@ -374,8 +376,9 @@ def displacement(parts: Sequence[Part]) -> Any:
 
 
 def fluid(parts: Sequence[Part], state: MeshState) -> Any:
-    """Wet length, in space area, and largest pressure and aperture over time; below, the pressure in the last frame: in
-    the plane on all channels, in space on those of a fracture that is flat, seen at a right angle."""
+    """Draw wet length, in space wet area, and largest pressure and aperture over time; below, the pressure in the last
+    frame: in the plane on all channels, in space on those of a flat fracture, seen at a right angle.
+    """
     from hpcdem.post import fluid as pictures
 
     if state.points.shape[1] == 3:
@@ -498,7 +501,9 @@ def _in_unit(values: Sequence[float], unit: str) -> tuple[list[float], str]:
 
 
 def emitted(found: Emission) -> Any:
-    """Load and events over time, rate by mode, magnitudes; magnitude-frequency plot and places of the events."""
+    """Draw load and events over time, rate by mode, magnitudes; magnitude-frequency plot and positions of the
+    events.
+    """
     low_height = 6.2
     figure, (a, b, c, low) = page([4.4, 3.6, 3.6, low_height], [GAP, GAP, LOWER_GAP], right=1.6)
     kinds = found.events.kinds()

@@ -71,7 +71,7 @@ WEDGE_HEAD = (
 
 
 def wedge_rows(done: Done, plan: Plan) -> np.ndarray:
-    """(frames, columns of WEDGE_HEAD); NaN where there is no wedge."""
+    """Return an array (frames, columns of WEDGE_HEAD); NaN without a wedge."""
 
     def row(stamp: Stamp, s: wedge.Shape | str) -> list[float]:
         if isinstance(s, str):
@@ -194,7 +194,7 @@ SUMMARY_HEAD = (
 
 
 def layer_names(g: Grains, plan: Plan) -> np.ndarray:
-    """(n,): the layer of each particle: its colour, or its group where all have one colour."""
+    """Return the layer of each particle (n,): its colour, or its group if all particles have one colour."""
     if len(np.unique(g.color)) > 1:
         return np.array([plan.request.color(c) for c in g.color.tolist()], dtype=object)
     return g.group
@@ -290,7 +290,7 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
 
 
 def tracks_part(scene: Scene) -> np.ndarray:
-    """(n, 3): id, x, y of the particles that are followed."""
+    """Return id, x, y of the followed particles (n, 3)."""
     g = scene.all
     rows = np.flatnonzero(np.isin(g.gid, scene.plan.followed))
     return np.stack([g.gid[rows], g.x[rows], g.y[rows]], axis=1)

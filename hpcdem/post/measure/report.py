@@ -53,8 +53,9 @@ FRAMES = {
 
 
 def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> list[Path]:
-    """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, `without` some,
-    else exactly what is requested. Raises HpcdemError on all ranks."""
+    """Measure a folder and return the files written (on rank 0). Without `what`: everything the folder allows, minus
+    `without`; otherwise exactly what is requested. Raises HpcdemError on all ranks. Collective.
+    """
     began = time.monotonic()
     what = [kind for kind in KINDS if kind in request.what or (not request.what and kind not in without)]
     of_blocks = on_first(comm, lambda: _of_blocks(request))
@@ -421,7 +422,7 @@ def _wallforce(request: Request) -> list[Path]:
 
 
 def write_sheet(folder: Path, sheet: Sheet) -> Path:
-    """Write a table as CSV, complete or not at all; numbers with ten digits, empty where missing."""
+    """Write a table as CSV, atomically; numbers with ten digits, empty if missing."""
     path = folder / f"{sheet.name}.csv"
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -37,17 +37,16 @@ SOLID_KINDS = ("regions", "displacement", "cracks", "fragments", "emission", "fl
 
 @dataclass(frozen=True)
 class Request:
-    """The request. Lengths in m.
+    """A request for measurements. Lengths in m.
 
-    what: of KINDS, all that the folder allows if empty; walls: ids, the first one is that which pushes; groups, colors:
-    only particles of these; first, last: steps, by default from the
-    last frame before the wall moves to the last; xmove, ymove: added to all coordinates; width: of columns and cells;
-    formats: of figures; strain, length, skin: threshold, shortest band and height above the base for faults; increment:
-    strain from frame to frame even if there are sections; over_time: faults with an identity through the frames, by
-    the strain from frame to frame; ids, points, number: particles to follow; log: of the run.
-    history: name of that which is drawn with the emission, none: none; bins: of its rate; completeness: magnitude Mc;
-    released: energies since the peak of the joints; joule: J per unit of energy in the files; box: its least
-    x, y, z, then its greatest [m].
+    what: names of KINDS, empty: all that the folder allows; walls: ids, the pushing wall first; groups, colors:
+    restrict to these particles; first, last: steps (default: from the last frame before the wall moves to the last
+    frame); xmove, ymove: offset of all coordinates; width: of columns and cells; formats: of figures; strain, length,
+    skin: threshold, shortest band and height above the base for faults; increment: strain from frame to frame even if
+    there are sections; over_time: follow faults through the frames by the strain from frame to frame; ids, points,
+    number: particles to follow; log: of the run; history: name of the history drawn with the emission, none: no
+    history; bins: of its rate; completeness: magnitude Mc; released: energies since the peak of the joints; joule: J
+    per unit of energy in the files; box: least x, y, z, then greatest x, y, z [m].
     """
 
     folder: Path
@@ -89,7 +88,7 @@ class Request:
         return self.color_names.get(int(number), str(number))
 
     def chosen(self, g: Grains) -> np.ndarray:
-        """(n,): which particles have the requested groups and colours."""
+        """Return flags (n,) of the particles with the requested groups and colours."""
         keep = np.ones(len(g), bool)
         if self.groups:
             keep &= np.isin(g.group.astype(str), self.groups)
@@ -100,9 +99,10 @@ class Request:
 
 @dataclass(frozen=True)
 class Plan:
-    """Settings for all frames: frames in order of time, those with sections, width of columns [m], the wall or the ids
-    of the row of particles that pushes, its direction +1 or -1, its position in the first frame [m], and ids of
-    particles to follow."""
+    """Settings for all frames: frames in order of time, those with sections, width of columns [m], the pushing wall or
+    the ids of the pushing row of particles, its direction +1 or -1, its position in the first frame [m], and ids of
+    particles to follow.
+    """
 
     request: Request
     frames: list[FrameFile]
@@ -115,18 +115,18 @@ class Plan:
     followed: np.ndarray
 
     def face(self, g: Grains) -> float:
-        """x [m] of the face of what pushes; NaN without it."""
+        """Return x of the face of the pushing wall or row [m]; NaN without one."""
         if self.wall is not None:
             return float(middle(g.walls, self.wall)[0])
         return face_of_row(g, self.row, self.forward) if len(self.row) else float("nan")
 
     def shortening(self, g: Grains) -> float:
-        """Displacement of what pushes [m], else NaN."""
+        """Return the displacement of the pushing wall or row [m]; NaN without one."""
         return self.forward * (self.face(g) - self.start)
 
 
 def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
-    """The plan, and the last frame that has particles. Raises HpcdemError."""
+    """Return the plan, and the last frame with particles. Raises HpcdemError."""
     frames = in_time(request.folder, request.first or 0, request.last)
     if not frames and set(what) == {"faults"}:  # the estimator needs no more than points that keep their numbers
         low, high = request.first or 0, np.inf if request.last is None else request.last
@@ -229,7 +229,7 @@ def bed_of(g: Grains) -> Grains:
 
 @dataclass
 class Scene:
-    """One frame: all its particles, and the requested ones; the frame before; its number and what holds for all."""
+    """One frame: all its particles, and the requested ones; the previous frame; its number and the common settings."""
 
     file: FrameFile
     number: int
@@ -244,7 +244,7 @@ class Scene:
 
     @cached_property
     def bed(self) -> Grains:
-        """The requested ones without detached pieces and fixed ones."""
+        """The requested particles without detached pieces and fixed particles."""
         return bed_of(self.grains)
 
     @property

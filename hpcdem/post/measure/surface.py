@@ -10,8 +10,9 @@ import numpy as np
 
 
 def surface(x: np.ndarray, y: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Surface points from left to right: centre of the highest grain in each column of width `cell`; empty ones left
-    out. x, y: (n,) [m]."""
+    """Return surface points from left to right: centre of the highest grain in each column of width `cell`; empty
+    columns are omitted. x, y: (n,) [m].
+    """
     column = np.floor(x / cell).astype(np.int64)
     order = np.lexsort((y, column))
     last = np.flatnonzero(np.diff(column[order], append=np.iinfo(np.int64).max))

@@ -10,7 +10,7 @@ from hpcdem.post.measure.grains import Grains
 
 
 def nearest(g: Grains, points: np.ndarray, number: int = 1) -> np.ndarray:
-    """Sorted ids of the `number` particles nearest to each of the points (m, 2) [m]."""
+    """Return the sorted ids of the `number` particles nearest to each of the points (m, 2) [m]."""
     found = []
     for x, y in np.asarray(points, dtype=float).reshape(-1, 2):
         away = np.hypot(g.x - x, g.y - y)
@@ -19,8 +19,9 @@ def nearest(g: Grains, points: np.ndarray, number: int = 1) -> np.ndarray:
 
 
 def spread(g: Grains, columns: int = 8, rows: int = 3) -> np.ndarray:
-    """Points (columns x rows, 2) spread evenly over the bed: in the middle of each column, between its lowest and its
-    highest particle."""
+    """Return points (columns x rows, 2) spread evenly over the bed: in the middle of each column, between its lowest
+    and its highest particle.
+    """
     if not len(g):
         return np.zeros((0, 2))
     edges = np.linspace(float(np.min(g.x)), float(np.max(g.x)), columns + 1)

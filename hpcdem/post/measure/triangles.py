@@ -9,8 +9,9 @@ from scipy.spatial import Delaunay, QhullError
 
 
 def triangles(x: np.ndarray, y: np.ndarray, reach: float) -> np.ndarray:
-    """(m, 3): rows of the corners of the triangles between neighbouring grains (Delaunay). Those with a side longer
-    than `reach` [m] span the surface or holes and are left out."""
+    """Return the corners (m, 3), as rows of particles, of the triangles between neighbouring grains (Delaunay).
+    Triangles with a side longer than `reach` [m] span the surface or holes and are omitted.
+    """
     points = np.column_stack([x, y])
     if len(points) < 3:
         return np.zeros((0, 3), np.int64)

@@ -50,8 +50,9 @@ class Curve:
 
 
 def read_walls(path: str | os.PathLike, first: int | None = None, last: int | None = None) -> dict[int, Curve]:
-    """The curve of each wall between two steps, by id; first None: from the last row before any wall moves. Raises
-    HpcdemError."""
+    """Return the curve of each wall between two steps, by id; first None: from the last row before any wall moves.
+    Raises HpcdemError.
+    """
     try:
         with open(path, encoding="utf-8") as file:
             if file.readline().strip() != HEADER:

@@ -73,8 +73,9 @@ def _fitted(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Shape:
-    """A wedge above its base. height: of the crest's grain top above the base below it; width: from the back to the
-    toe [m]; base: slope of the base [degrees, positive where it falls to the left, towards the back]."""
+    """A wedge above its base. height: top of the grain at the crest above the base below it; width: from the back to
+    the toe [m]; base: slope of the base [degrees, positive if it falls to the left, towards the back].
+    """
 
     wedge: Wedge
     back: float
@@ -89,9 +90,10 @@ class Shape:
 
 
 def shape(x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, back: float | None = None) -> Shape:
-    """Shape of the wedge of all these grains. back: where it begins, the face of the wall that pushes [m]; the
-    leftmost grain by default. Raises ValueError where there is no wedge: as `wedge`, or where the crest stands less
-    than the largest diameter above the toe."""
+    """Return the shape of the wedge of these grains. back: its rear end, the face of the pushing wall [m] (default: the
+    leftmost grain). Raises ValueError without a wedge: as `wedge`, or if the crest is less than the largest diameter
+    above the toe.
+    """
     if not len(x):
         raise ValueError("no particles")
     found = wedge(*surface(x, y, cell))

@@ -258,7 +258,7 @@ def _shared(tasks: Sequence[tuple[Callable[..., None], tuple[Any, ...]]], comm: 
 
 
 def _name_changes(outlines: Sequence[survey.Outline], request: Request, log: Any) -> None:
-    """Say where particles came or went although the options do not tell of it."""
+    """Warn of particles added or removed without the corresponding option."""
     for before, o in pairwise(outlines):
         if o.came and not request.addball:
             log.warn(f"{o.came} particles were added between {before.name} and {o.name}: add --addball ON if intended")

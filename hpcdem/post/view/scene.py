@@ -180,8 +180,9 @@ def default_view(moment: Moment) -> ModelView:
 
 
 def telling(moment: Moment) -> str:
-    """The field that tells what has happened to elements: displacement if they have moved, else stress if there is
-    some, else temperature if it differs; "", their groups, if nothing has happened yet."""
+    """Return the most informative field of elements: displacement if they have moved, else stress if there is some,
+    else temperature if it differs; "", their groups, if nothing has happened yet.
+    """
     elements = moment.of("elements")
     if moment.displacement is not None and elements.count:
         most = np.nanmax(np.abs(moment.displacement()), initial=0.0)

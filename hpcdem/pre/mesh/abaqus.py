@@ -88,8 +88,9 @@ class Keyword:
 
 @dataclass
 class Entry:
-    """One entry of a set: its element or node numbers, or the name of another set. nodes_of: take the points of that
-    element set; instance: to which it belongs; side: of a surface."""
+    """One entry of a set: its element or node numbers, or the name of another set. nodes_of: use the points of that
+    element set; instance: that it belongs to; side: of a surface.
+    """
 
     value: np.ndarray | range | str
     line: Line
@@ -100,9 +101,10 @@ class Entry:
 
 @dataclass
 class Scope:
-    """A part, an instance, or what stands outside of both (name ""). seen: points of all elements so far; others: the
-    elements of kinds that are left out; sets: by kind and name in capitals; inner: sets that Abaqus/CAE has made for
-    itself; turn, move: where the instance has the points of its part."""
+    """A part, an instance, or what is outside of both (name ""). seen: points of all elements so far; others: elements
+    of ignored kinds; sets: by kind and name in capitals; inner: sets created internally by Abaqus/CAE; turn, move:
+    transformation of the points of the part.
+    """
 
     name: str
     nodes: dict[int, tuple[float, ...]] = field(default_factory=dict)
@@ -116,7 +118,7 @@ class Scope:
     move: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def copy(self, name: str) -> Scope:
-        """An instance of this part."""
+        """Return an instance of this part."""
         sets = {key: list(entries) for key, entries in self.sets.items()}
         return Scope(
             name,

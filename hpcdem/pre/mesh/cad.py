@@ -34,8 +34,9 @@ KINDS = (".step", ".stp", ".brep", ".stl", ".dxf")
 
 
 def read(path: Path, layer: str | None = None, scale: float | None = None, notes: list[str] | None = None) -> list[Any]:
-    """The bodies of a file [m]; layer: only this one of a DXF file; scale: metres per unit of the file (STEP and DXF
-    files name theirs); notes: receives messages. HpcdemError with the file name for what is missing."""
+    """Read the bodies of a file [m]. layer: only this one of a DXF file; scale: metres per unit of the file (STEP and
+    DXF files define theirs); notes: receives messages. HpcdemError with the file name if something is missing.
+    """
     notes = [] if notes is None else notes
     kind = path.suffix.lower()
     if not path.is_file():
@@ -83,8 +84,9 @@ def _shell(path: Path, triangles: np.ndarray) -> Shell:
 
 
 def outwards(of: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, int]:
-    """The triangles (k, 3), turned so that neighbours run along their common side opposite ways and each piece of them
-    faces outwards; and how many pieces there are. corners: (n, 3) [m]."""
+    """Return the triangles (k, 3), oriented so that neighbours traverse their common side in opposite directions and
+    each piece faces outwards, and the number of pieces. corners: (n, 3) [m].
+    """
     of = of.copy()
     sides: dict[tuple[int, int], list[int]] = {}
     for t, row in enumerate(of.tolist()):

@@ -34,10 +34,11 @@ def _sides(mesh: Mesh) -> Edges:
 
 
 def edges_on(mesh: Mesh, curves: Sequence[Curve], tolerance: float | None = None) -> np.ndarray:
-    """(k, 2) i8 end points of the edges that lie on curves: both ends do, and for straight segments the middle too.
+    """Return the end points (k, 2) i8 of the edges that lie on curves: both ends do, and for straight segments the
+    middle too.
 
-    tolerance [m]; None: TOLERANCE times the length of the edge. The chord of an arc lies on it if its ends do and it is
-    the chord of the short way between them. Edges inside a six-node triangle lie on none.
+    tolerance: [m]; None: TOLERANCE times the length of the edge. The chord of an arc lies on it if its ends do and it
+    spans the shorter arc between them. Edges inside a six-node triangle are excluded.
     """
     edges = _sides(mesh)
     a, b = mesh.points[edges.points[:, 0]], mesh.points[edges.points[:, 1]]
@@ -71,15 +72,15 @@ def _box(p: np.ndarray, q: np.ndarray, bulge: float) -> tuple[np.ndarray, np.nda
 
 
 def with_layer(mesh: Mesh, name: str, pairs: np.ndarray) -> Mesh:
-    """The mesh with these edges added to one of its layers."""
+    """Return the mesh with these edges added to one of its layers."""
     old = mesh.layers.get(name, np.empty((0, mesh.dim), np.int64))
     layers = dict(mesh.layers) | {name: np.unique(np.concatenate([old, np.sort(pairs, axis=1)]), axis=0)}
     return replace(mesh, layers=layers)
 
 
 def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
-    """The mesh with cracks on these edges (k, 2), in space faces (k, 3), in the fracture set `number`; those at a
-    surface are skipped.
+    """Return the mesh with cracks on these edges (k, 2), in space faces (k, 3), in the fracture set `number`; those at
+    a surface are skipped.
 
     An edge that has a crack already keeps its set.
     """
@@ -99,7 +100,9 @@ def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
 
 
 def faces_on(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
-    """(k, 3) i8 points of the faces that lie on surfaces or those of bodies, in space; of hexahedra their sides."""
+    """Return the points (k, 3) i8 of the faces, of hexahedra the sides, that lie on surfaces or those of
+    bodies, in space.
+    """
     edges = _sides(mesh)
     slack = TOLERANCE * float(np.ptp(mesh.points, axis=0).max())
     at = mesh.points[edges.points]
@@ -108,9 +111,10 @@ def faces_on(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
 
 
 def between_sides(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
-    """(k, 3) i8 points of the inner faces whose elements have their middles on different sides of a surface, and their
-    own middle, of sides of hexahedra that of all four points, over it: a rough face about it, without holes and in one
-    piece, of about 1.75 times its area."""
+    """Return the points (k, 3) i8 of the inner faces between elements whose centres are on different sides of a
+    surface, if the centre of the face, for hexahedra of the side, projects onto the surface: a rough face along it,
+    without holes, in one piece, with about 1.75 times its area.
+    """
     edges = mesh.edges()
     inner = np.flatnonzero(edges.inner)
     sides = edges.faces[inner] // 4
@@ -132,11 +136,11 @@ def between_sides(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
 
 
 def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
-    """The mesh with cracks along the edges that follow traces best; points stay where they are.
+    """Return the mesh with cracks along the edges that follow traces best; points do not move.
 
-    A trace runs from the point of the mesh nearest to its beginning to that nearest to its end, by the way along edges
-    that costs least: the length of each edge times 1 + STRAYING (distance of its middle from the trace / its length)2.
-    Traces shorter than the edges about them leave no crack. Edges inside a six-node triangle are no way.
+    A trace runs from the point of the mesh nearest to its beginning to the one nearest to its end, along the path of
+    edges with the least cost: the length of each edge times 1 + STRAYING (distance of its middle from the trace / its
+    length)2. Traces shorter than the surrounding edges leave no crack. Edges inside a six-node triangle are not used.
     """
     paths = _Paths(mesh, _sides(mesh))
     pairs, sets = [], []
@@ -163,7 +167,7 @@ class _Paths:
         self.tree = cKDTree(mesh.points)
 
     def along(self, start: np.ndarray, end: np.ndarray) -> list[int]:
-        """Points from the one nearest to `start` to the one nearest to `end` (Dijkstra's shortest way, with costs)."""
+        """Points from the one nearest to `start` to the one nearest to `end` (Dijkstra's shortest path, with costs)."""
         source, goal = (self._nearest(p) for p in (start, end))
         cost, before = {source: 0.0}, {source: source}
         done: set[int] = set()

@@ -25,9 +25,10 @@ GRID = 400
 
 @dataclass(frozen=True)
 class Poles:
-    """Normals of discs: kind "fixed", or "fisher" about the mean with density kappa exp(kappa cos a) / (4 pi sinh
-    kappa) (Fisher 1953; kappa 0: all directions alike). dip [degrees] of the mean, and towards: the direction that it
-    dips to [degrees], clockwise from y as seen from above."""
+    """Normals of discs. kind: "fixed", or "fisher" about the mean with density kappa exp(kappa cos a) / (4 pi sinh
+    kappa) (Fisher 1953; kappa 0: uniform). dip: of the mean [degrees]; towards: dip direction [degrees], clockwise from
+    y as seen from above.
+    """
 
     kind: str
     dip: float
@@ -72,9 +73,10 @@ class Poles:
 
 @dataclass(frozen=True)
 class DiscSet:
-    """One set of discs: measure "p10", "p30" or "p32" with its density; along: direction of the scan line of p10;
-    reached: discs are made until p30 or p32 is met in the bodies, as nearly as whole discs can, instead of a number
-    from the Poisson distribution."""
+    """One set of discs. measure: "p10", "p30" or "p32" with its density; along: direction of the scan line of p10;
+    reached: generate discs until p30 or p32 is met in the bodies as closely as whole discs allow, instead of a number
+    from the Poisson distribution.
+    """
 
     poles: Poles
     radius: Length

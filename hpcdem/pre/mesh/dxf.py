@@ -31,7 +31,7 @@ FLATTENING = 1e-4
 
 
 def opened(path: Path) -> Any:
-    """The drawing; HpcdemError for what is none."""
+    """Open a drawing; HpcdemError if the file is none."""
     ezdxf = optional.ezdxf()
     try:
         return ezdxf.readfile(path)
@@ -42,7 +42,9 @@ def opened(path: Path) -> Any:
 
 
 def metres(document: Any, scale: float | None, notes: list[str]) -> float:
-    """Metres in a unit of the drawing: as given, else by its header ($INSUNITS), else 1; notes: gets what was taken."""
+    """Return the metres per unit of the drawing: as given, else by its header ($INSUNITS), else 1. notes: receives the
+    choice.
+    """
     code = int(document.header.get("$INSUNITS", 0))
     name, factor = UNITS.get(code, ("", 1.0))
     unit_text = f"the drawing is in {name} ($INSUNITS {code})" if name else "the drawing defines no unit ($INSUNITS)"
@@ -53,8 +55,9 @@ def metres(document: Any, scale: float | None, notes: list[str]) -> float:
 
 
 def write(path: Path, layers: Mapping[str, Sequence[Curve]], units: int = 6) -> None:
-    """A drawing of these curves, by layer; units: a code of UNITS, 0 none. CommandError for a name that no layer of a
-    drawing can have."""
+    """Write a drawing of these curves, by layer. units: a code of UNITS, 0 none. CommandError for an invalid
+    layer name.
+    """
     ezdxf = optional.ezdxf()
     document = ezdxf.new("R2010", units=units)
     space = document.modelspace()

@@ -38,10 +38,11 @@ class Block:
 
 @dataclass
 class FileMesh:
-    """points (n, 3) in units of the file, point_ids (n,) their numbers in it; blocks; sets by name of elements
-    (counted over all blocks), of points (rows) and of faces (each (m, 1 to 4) corners); notes: what was left out, in
-    words; strict: its lines and surfaces are sides of its elements; parts: where the points and elements of each
-    instance of an assembly begin, and its name; instances: their elements; files: that were read."""
+    """Contents of a mesh file. points (n, 3): in units of the file; point_ids (n,): their numbers in it; blocks; sets
+    by name: of elements (counted over all blocks), of points (rows) and of faces (each (m, 1 to 4) corners); notes:
+    ignored contents, in words; strict: its lines and surfaces are sides of its elements; parts: first point and element
+    of each instance of an assembly, and its name; instances: their elements; files: files read.
+    """
 
     path: Path
     points: np.ndarray

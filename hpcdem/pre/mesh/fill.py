@@ -29,9 +29,10 @@ HXT, DELAUNAY = 10, 1
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """outline, holes: bodies; size: of edges [m]; regions: (group, bodies) of parts with a group of their own; refine:
-    (bodies and surfaces, size there [m], distance over which it grows to that of the rest [m] or None); surfaces:
-    (layer, surfaces) that become faces of the mesh."""
+    """Input of a mesh in space. outline, holes: bodies; size: of edges [m]; regions: (group, bodies) of parts with
+    their own group; refine: (bodies and surfaces, size there [m], distance over which it grows to the general size [m]
+    or None); surfaces: (layer, surfaces) that become faces of the mesh.
+    """
 
     outline: Sequence[Any]
     size: float
@@ -43,8 +44,9 @@ class MeshSettings:
 
 @dataclass
 class Filled:
-    """points (np, 3) [m], tetrahedra (ne, 4), element numbers by group, faces (k, 3) by layer of surfaces, and notes
-    about what was moved to make it."""
+    """A mesh in space: points (np, 3) [m], tetrahedra (ne, 4), element numbers by group, faces (k, 3) by layer of
+    surfaces, and notes about moved geometry.
+    """
 
     points: np.ndarray
     cells: np.ndarray
@@ -54,7 +56,7 @@ class Filled:
 
 
 def filled(settings: MeshSettings, group: str) -> Filled:
-    """The mesh; `group`: of what is in no region. HpcdemError where Gmsh fails, or the size makes too many elements."""
+    """Make the mesh. group: of elements in no region. HpcdemError if Gmsh fails or the size makes too many elements."""
     optional.gmsh()
     for what, of in (("the outline", settings.outline), ("a hole", settings.holes), *(
         (f"region '{name}'", one) for name, one in settings.regions

@@ -28,7 +28,7 @@ VOLUME = 2_000_000
 
 
 def discs(one: DiscSet, bodies: Sequence[Any], seed: int, number: int = 0) -> list[Disc]:
-    """The discs of a set that may reach into bodies, whole ones."""
+    """Return the complete discs of a set that may reach into bodies."""
     one.check("fractures")
     flat = [body for body in bodies if body.surface]
     if flat or not bodies:
@@ -52,7 +52,9 @@ def area(of: Sequence[Disc]) -> float:
 
 
 def area_inside(disc: Disc, bodies: Sequence[Any]) -> float:
-    """Area of the part inside of bodies [m2], by points in a spiral (Vogel 1979), each of which stands for as much."""
+    """Return the area of the part of a disc inside bodies [m2], by points in a spiral (Vogel 1979) that represent equal
+    areas.
+    """
     k = np.arange(SPOTS) + 0.5
     radius, turn = disc.radius * np.sqrt(k / SPOTS), k * math.pi * (3.0 - math.sqrt(5.0))
     u, v = _frame(disc.plane()[1])

@@ -58,11 +58,11 @@ class Orientation:
 
 @dataclass(frozen=True)
 class Length:
-    """Length of traces [m], cut off below `least` and above `greatest` (and drawn again from what remains).
+    """Length of traces [m], truncated below `least` and above `greatest` (drawn from the remaining distribution).
 
     kind: "fixed" (value); "exponential" (value: mean); "lognormal" (value, spread: mean and standard deviation of the
-    length itself); "power" (density proportional to l ** -value between least and greatest). value and spread describe
-    the distribution before it is cut off.
+    length); "power" (density proportional to l ** -value between least and greatest). value and spread describe the
+    distribution before truncation.
     """
 
     kind: str
@@ -96,13 +96,15 @@ class Length:
         return np.clip(self._inverse(low + u * (high - low)), self.least, self.greatest)
 
     def mean(self, power: int = 1) -> float:
-        """E[l ** power] after the cut-off [m]: midpoint rule over the inverse distribution, refined at both ends."""
+        """Return E[l ** power] after truncation [m]: midpoint rule over the inverse distribution, refined at
+        both ends.
+        """
         # u = t2 (3 - 2 t) crowds points at both ends, where the inverse of an unbounded distribution is steep.
         t = (np.arange(100_000) + 0.5) / 100_000
         return float((self.lengths(t * t * (3.0 - 2.0 * t)) ** power * 6.0 * t * (1.0 - t)).mean())
 
     def longest(self) -> float:
-        """The greatest length that need be reckoned with [m]: all but one in 1e9 traces are shorter."""
+        """Return a practical upper bound of the length [m]: all but one in 1e9 traces are shorter."""
         return self.value if self.kind == "fixed" else float(self.lengths(np.array([1.0 - 1e-9]))[0])
 
     def _share(self) -> float:

@@ -56,7 +56,7 @@ def joined(*parts: Fractures) -> Fractures:
 
 
 def of_curves(curves: Sequence[Curve], number: int, size: float) -> Fractures:
-    """The segments of curves as traces of one set; arcs in steps of `size` [m] at most."""
+    """Return the segments of curves as traces of one set; arcs in steps of at most `size` [m]."""
     rows = []
     for curve in curves:
         if curve.segments:
@@ -68,10 +68,10 @@ def of_curves(curves: Sequence[Curve], number: int, size: float) -> Fractures:
 
 
 def network(sets: Sequence[FractureSet], region: Any, seed: int, least: float = 0.0, first: int = 0) -> Fractures:
-    """Traces of several sets in a region.
+    """Generate traces of several sets in a region, equal for any number of ranks.
 
-    region: a polygon of shapely (see `regions.polygon_of`), which may have holes; least: pieces cut off by its rim that
-    are shorter are left out [m]; first: number of the first set. The same for any number of ranks, machine by machine.
+    region: a polygon of shapely (see `regions.polygon_of`), possibly with holes; least: pieces cut off by its boundary
+    that are shorter than this are discarded [m]; first: number of the first set.
     """
     if seed < 0:
         raise CommandError(f"the seed must not be negative, but is {seed}")

@@ -49,12 +49,12 @@ class Curve:
 
 
 def point(at: Vector) -> Curve:
-    """A single point."""
+    """Return a single point."""
     return _curve([at], closed=False, least=1, what="point")
 
 
 def polyline(points: Sequence[Vector], closed: bool = False) -> Curve:
-    """Straight segments through the points; if the last equals the first the line is closed."""
+    """Return straight segments through the points; the line is closed if the last point equals the first."""
     xy = [tuple(p) for p in points]
     if len(xy) > 2 and xy[0] == xy[-1]:
         xy, closed = xy[:-1], True
@@ -62,7 +62,7 @@ def polyline(points: Sequence[Vector], closed: bool = False) -> Curve:
 
 
 def polygon(points: Sequence[Vector]) -> Curve:
-    """A closed polyline that must not cross itself."""
+    """Return a closed polyline; it must not cross itself."""
     curve = polyline(points, closed=True)
     hit = _self_crossing(curve.points)
     if hit is not None:
@@ -71,7 +71,7 @@ def polygon(points: Sequence[Vector]) -> Curve:
 
 
 def rectangle(one: Vector, other: Vector) -> Curve:
-    """Rectangle between two opposite corners, counter-clockwise from the lower left."""
+    """Return the rectangle between two opposite corners [m], counter-clockwise from the lower left."""
     (x0, y0), (x1, y1) = _pair(one, "rectangle"), _pair(other, "rectangle")
     if x0 == x1 or y0 == y1:
         raise CommandError(f"rectangle: the corners ({x0:g}, {y0:g}) and ({x1:g}, {y1:g}) span no area")
@@ -80,15 +80,16 @@ def rectangle(one: Vector, other: Vector) -> Curve:
 
 
 def circle(centre: Vector, radius: float) -> Curve:
-    """Circle [m], counter-clockwise: two half arcs."""
+    """Return a circle [m], counter-clockwise: two half arcs."""
     x, y = _pair(centre, "circle")
     _positive(radius, "circle: radius")
     return Curve(np.array([[x - radius, y], [x + radius, y]]), np.array([1.0, 1.0]), True)
 
 
 def segmented_circle(centre: Vector, radius: float, length: float) -> Curve:
-    """Polygon of equal sides of nearly this length with its corners on a circle [m], the first in the direction of x;
-    at least three."""
+    """Return a polygon of at least three equal sides of about this length with its corners on a circle [m], the first
+    in the direction of x.
+    """
     x, y = _pair(centre, "circle")
     _positive(radius, "circle: radius")
     _positive(length, "circle: segment length")
@@ -101,7 +102,9 @@ def segmented_circle(centre: Vector, radius: float, length: float) -> Curve:
 
 
 def arc(centre: Vector, radius: float, start: float, end: float) -> Curve:
-    """Arc [m], counter-clockwise from angle `start` to angle `end` [degrees from the x axis]; less than a circle."""
+    """Return an arc [m], counter-clockwise from angle `start` to angle `end` [degrees from the x axis]; less than a
+    circle.
+    """
     x, y = _pair(centre, "arc")
     _positive(radius, "arc: radius")
     if not (math.isfinite(start) and math.isfinite(end)):
@@ -117,8 +120,9 @@ def arc(centre: Vector, radius: float, start: float, end: float) -> Curve:
 
 
 def arc_between(centre: Vector, start: Vector, end: Vector) -> Curve:
-    """Arc about a centre, counter-clockwise from a point to another [m]; CommandError if they are not as far from it as
-    each other."""
+    """Return an arc about a centre, counter-clockwise between two points [m]; CommandError if they are not at the same
+    distance from it.
+    """
     one, other = (np.array(_pair(at, "arc")) - np.array(_pair(centre, "arc")) for at in (start, end))
     radius, far = float(np.hypot(*one)), float(np.hypot(*other))
     if abs(radius - far) > 1e-6 * max(radius, far):
@@ -138,7 +142,7 @@ def transformed(
     scale: float | Vector = 1.0,
     about: Vector = (0.0, 0.0),
 ) -> Curve:
-    """Scaled and then rotated (counter-clockwise, degrees) about the point `about`, then moved by `translate` [m].
+    """Scale a curve, rotate it (counter-clockwise, degrees) about the point `about`, then translate it [m].
 
     A negative factor mirrors. CommandError if an arc would become an ellipse.
     """
@@ -188,7 +192,7 @@ class Layers:
         return iter(self.curves)
 
     def remove(self, layer: str) -> None:
-        """Forget a layer."""
+        """Remove a layer."""
         del self.curves[self._known(layer)]
 
     def transform(self, layer: str, copy_to: str | None = None, **how: Any) -> None:

@@ -22,7 +22,9 @@ from hpcdem.pre.mesh.remade import Moved, Remade
 
 @dataclass(frozen=True)
 class Glued(Remade):
-    """faces: how many pairs of faces are inner ones now; cut: how many elements were cut; tolerance [m]."""
+    """Result of `glued`. faces: number of pairs of faces that became inner faces; cut: number of elements cut;
+    tolerance [m].
+    """
 
     faces: int
     tolerance: float
@@ -30,12 +32,12 @@ class Glued(Remade):
 
 
 def glued(mesh: Mesh, tolerance: float | None = None, between: tuple[np.ndarray, np.ndarray] | None = None) -> Glued:
-    """Faces that lie on each other within `tolerance` [m] become inner faces. Elements keep their numbers, pieces of
-    those that are cut come last; of points that become one the lowest stays where it is.
+    """Make faces that coincide within `tolerance` [m] inner faces. Elements keep their numbers, and pieces of cut
+    elements follow; of merged points the lowest keeps its position.
 
-    between: elements (ne,) bool of the two sides; faces between others stay as they are. CommandError, with the place,
-    if nothing lies on each other, if faces cannot be cut so that they fit, if bodies overlap there, or if the
-    tolerance would make points of one element one.
+    between: elements (ne,) bool of the two sides; other faces do not change. CommandError, with the position, if no
+    faces coincide, if faces cannot be cut to fit, if bodies overlap there, or if the tolerance would merge points of
+    one element.
     """
     free = _between(fit.free_faces(mesh), between)
     if not len(free.faces):
@@ -138,7 +140,7 @@ def _allowed(free: fit.Free, pairs: np.ndarray, between: tuple[np.ndarray, np.nd
 
 
 def _refuse_overlap(free: fit.Free, corners: np.ndarray, between: tuple[np.ndarray, np.ndarray] | None) -> None:
-    """CommandError if faces with the same corners look the same way, or if three have them."""
+    """Raise CommandError if faces with the same corners have the same normal, or if three faces share them."""
     key = np.sort(corners, axis=1)
     order = np.lexsort((free.faces, *key.T[::-1]))
     same = np.flatnonzero((key[order[1:]] == key[order[:-1]]).all(axis=1))

@@ -34,8 +34,9 @@ Sets = dict[str, dict[str, np.ndarray]]
 
 @dataclass(frozen=True)
 class Imported:
-    """A mesh, with its groups of elements; set -> group -> numbers of its nodes and of its faces; notes: what else the
-    file held, or was changed; files: that were read with it."""
+    """An imported mesh, with its groups of elements; groups of nodes and faces: set -> group -> numbers; notes: ignored
+    or changed contents; files: files read.
+    """
 
     mesh: Mesh
     nodes: Sets = field(default_factory=dict)
@@ -45,20 +46,20 @@ class Imported:
 
 
 def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Mesh:
-    """The mesh of `read`."""
+    """Return the mesh of `read`."""
     return read(path, merge, scale, dim).mesh
 
 
 def read(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Imported:
-    """A mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and hexahedra (hexahedra precede).
+    """Read a mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and hexahedra (hexahedra precede).
 
     Physical groups (Gmsh) and sets (Abaqus) of elements and of points become groups of the set SET; one that overlaps
-    an earlier one gets a set of its own, of the same name. Physical lines, in space surfaces, and surfaces of Abaqus
-    become layers and groups of faces; physical points, in space lines, groups of nodes. Elements that run clockwise, or
-    are turned inside out, are turned back; elements of second order get straight edges; points that no element uses are
-    left out. merge: points nearer than that [m, after scaling] are made one; scale: metres per unit of the file.
+    an earlier one gets its own set, of the same name. Physical lines, in space surfaces, and surfaces of Abaqus become
+    layers and groups of faces; physical points, in space lines, groups of nodes. Elements with clockwise or inverted
+    orientation are reversed; elements of second order get straight edges; unused points are removed. merge: points
+    nearer than this are merged [m, after scaling]; scale: metres per unit of the file.
 
-    HpcdemError, with the numbers of the file, for what cannot be used.
+    HpcdemError, with the numbers of the file, for unsupported contents.
     """
     path = Path(path)
     if not scale > 0.0 or not merge >= 0.0:

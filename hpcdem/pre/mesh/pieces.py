@@ -11,9 +11,10 @@ OUTLINE, HOLE, LINE = "outline", "hole", "line"
 
 @dataclass(frozen=True)
 class Piece:
-    """layers: of geometry; or a shape of its own: its kind and values; role: it bounds the mesh, a hole in it, or the
-    mesh follows it, as far as it lies inside; size: of edges there [m], None: that of the whole; what: messages call it
-    so."""
+    """A piece of the input of a mesh. layers: of geometry, or else a shape: its kind and values; role: it bounds the
+    mesh, bounds a hole, or is followed by the mesh where it lies inside; size: of edges there [m], None: general size;
+    what: its name in messages.
+    """
 
     role: str
     what: str

@@ -1,8 +1,8 @@
 """Points and edges in the plane that meet in points only, and keep apart as far as a mesh of the wanted size needs.
 
-Outlines are put in as they are (`fixed`). Cracks and inner layers give way: what comes nearer to an existing point or
-edge than `ratio` times the local mesh size is moved onto it. So cracks that cross just beside a corner cross in it, a
-tip that ends just before another crack ends on it, and two cracks at a small angle run together until they are far
+Outlines are inserted unchanged (`fixed`). Cracks and inner layers are adjusted: what comes nearer to an existing point
+or edge than `ratio` times the local mesh size is moved onto it. So cracks that cross just beside a corner cross in it,
+a tip that ends just before another crack ends on it, and two cracks at a small angle run together until they are far
 enough apart. No single move is farther than that distance; where lines crowd, moves can add up. Traces are worked
 through in the order given: the same input makes the same edges, to the last bit.
 """
@@ -91,10 +91,10 @@ class Plane:
         return i if i >= 0 else self._divide_at(best, *foot)
 
     def add_line(self, start: tuple[float, float], end: tuple[float, float], labels: Labels) -> None:
-        """A straight trace, cut at what it crosses. `divide` then cuts all edges to size.
+        """Add a straight trace, cut at what it crosses. `divide` then cuts all edges to size.
 
-        The two are apart because a trace must give way to corners, tips and crossings, but not to points that come
-        about only as edges are made short.
+        The two steps are separate because a trace must avoid corners, tips and crossings, but not points that arise
+        only when edges are divided.
         """
         self._lay(self.add_point(*start), self.add_point(*end), labels, short=False)
 
@@ -127,7 +127,9 @@ class Plane:
             self.join(i, j, labels, fixed=True)
 
     def _lay(self, a: int, b: int, labels: Labels, short: bool) -> None:
-        """Put the way from a to b into the plane, cut and moved as need be; `short`: in edges of the mesh size."""
+        """Insert the path from a to b into the plane, cut and moved as necessary; `short`: in edges of the mesh
+        size.
+        """
         stack = [*self.pending, (a, b, labels, short)]
         self.pending.clear()
         moves = 0
@@ -262,12 +264,14 @@ class Plane:
         return i
 
     def _send_through(self, key: tuple[int, int], i: int) -> None:
-        """Take an edge out, to be laid again by way of a point."""
+        """Remove an edge, to be inserted again through a point."""
         labels = self._take(key)
         self.pending += [(key[0], i, labels, False), (i, key[1], labels, False)]
 
     def _between(self, i: int, a: int, b: int) -> bool:
-        """Point i is nearer to both ends than these to each other, so that both parts of a way by it are shorter."""
+        """Return whether point i is nearer to both ends than these are to each other, so that both parts of a path
+        through it are shorter.
+        """
         return i not in (a, b) and max(
             math.hypot(self.x[i] - self.x[e], self.y[i] - self.y[e]) for e in (a, b)
         ) < math.hypot(self.x[b] - self.x[a], self.y[b] - self.y[a])

@@ -11,9 +11,10 @@ from hpcdem.pre.mesh.remade import Moved, Remade, named
 
 
 def quadratic(mesh: Mesh) -> Remade:
-    """The mesh with a six-node triangle in place of each triangle, its sides straight. The four parts of triangle e are
-    the elements 4 e to 4 e + 3, the point between the ends of edge k is that behind all others before, plus k; groups,
-    layers and cracks stay where they are. CommandError for other elements."""
+    """Return the mesh with each triangle replaced by a six-node triangle with straight sides. The four parts of
+    triangle e are the elements 4 e to 4 e + 3; the point on edge k follows the existing points, at index k. Groups,
+    layers and cracks do not change. CommandError for other elements.
+    """
     if mesh.dim == 2 and len(mesh.macros):
         raise CommandError("the mesh already has six-node triangles")
     if mesh.dim == 3 or (mesh.cells[:, 3] >= 0).any():

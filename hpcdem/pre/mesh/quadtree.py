@@ -19,9 +19,10 @@ SHARP = 1e-9
 
 
 def densified(mesh: Mesh, elements: np.ndarray, pattern: Sequence[int], most: Sequence[float]) -> Remade:
-    """The mesh in which these elements, as far as they are quads, are no longer than `most` (x, y) [m] along the
-    directions of the pattern (x, y: 1, or 0: as they are). Of two neighbours one is at most twice as fine. The first
-    piece of an element keeps its number, others come last. CommandError if there is nothing to do."""
+    """Return the mesh in which the quads among these elements are no longer than `most` (x, y) [m] along the directions
+    of the pattern (x, y: 1, or 0: unchanged). Neighbours differ by a factor of at most two. The first piece of an
+    element keeps its number, others follow at the end. CommandError if nothing changes.
+    """
     if mesh.dim == 3:
         raise CommandError("densify supports quads in two dimensions only")
     if not any(pattern):

@@ -13,9 +13,10 @@ from hpcdem.physics.fdem.mesh import Mesh, sizes
 
 @dataclass(frozen=True)
 class Quality:
-    """Figures of a mesh; angles in degrees, lengths in metres, elements by their number, hexahedra by that of their
-    first one. In space angles are those between the sides of an element, `edges`, `crack_edges` and `crack_length`
-    faces and areas [m2], `area` the volume [m3]."""
+    """Quality measures of a mesh; angles in degrees, lengths in metres; elements by number, hexahedra by that of their
+    first element. In space, angles are those between the sides of an element; `edges`, `crack_edges` and `crack_length`
+    are faces and areas [m2], `area` is the volume [m3].
+    """
 
     dim: int
     points: int

@@ -26,8 +26,9 @@ Face = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Refined:
-    """mesh: points and elements only; faces: how many pieces both sides have in common; parent (ne,): element before;
-    pieces: of sides that were cut, by their sorted points; cut: how many elements were."""
+    """Result of `refined`. mesh: points and elements only; faces: number of common pieces of both sides; parent (ne,):
+    original element; pieces: of cut sides, by their sorted points; cut: number of elements cut.
+    """
 
     mesh: Mesh
     faces: int

@@ -117,7 +117,7 @@ def positive(value: float, what: str) -> None:
 
 
 def not_too_many(elements: float, what: str) -> None:
-    """CommandError if so many elements are more than can be made; what: makes them, in words."""
+    """Raise CommandError for too many elements; what: their source, in words."""
     if not elements <= MOST_ELEMENTS:
         raise CommandError(f"{what} would make about {elements:.2g} elements, at most {MOST_ELEMENTS:.0g} allowed")
 

@@ -49,7 +49,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Box(Body):
-    """Along the axes, between two corners [m]."""
+    """A box along the axes, between two corners [m]."""
 
     first: Point
     second: Point
@@ -94,8 +94,9 @@ class Sphere(Body):
 
 
 class _Round(Body):
-    """A body of revolution about the way from `first` to `second`, by its outline in the half plane (along, from the
-    axis)."""
+    """A body of revolution about the axis from `first` to `second`, by its outline in the half plane (along, from the
+    axis).
+    """
 
     first: Point
     second: Point
@@ -127,7 +128,7 @@ class _Round(Body):
 
 @dataclass(frozen=True)
 class Cylinder(_Round):
-    """A round one, between the middles of its ends [m]."""
+    """A circular cylinder between the centres of its ends [m]."""
 
     first: Point
     second: Point
@@ -144,7 +145,7 @@ class Cylinder(_Round):
 
 @dataclass(frozen=True)
 class Cone(_Round):
-    """A round one with a radius at each end [m], one of which may be 0."""
+    """A circular cone with a radius at each end [m], one of which may be 0."""
 
     first: Point
     second: Point
@@ -210,7 +211,7 @@ class Extruded(Body):
 
 @dataclass(frozen=True)
 class Revolved(Body):
-    """A polygon (its corners) that is turned about an axis in its plane, by an angle [degrees], right-handed."""
+    """A polygon (its corners) revolved about an axis in its plane by an angle [degrees], right-handed."""
 
     corners: tuple[Point, ...]
     about: Point
@@ -409,7 +410,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Polygon(Surface):
-    """A flat one, by its corners in order [m]."""
+    """A plane polygon, by its corners in order [m]."""
 
     corners: tuple[Point, ...]
 
@@ -436,7 +437,7 @@ class Polygon(Surface):
 
 @dataclass(frozen=True)
 class Disc(Surface):
-    """A flat round one: centre, normal of any length, radius [m]."""
+    """A plane disc: centre [m], normal of any length, radius [m]."""
 
     centre: Point
     normal: Point
@@ -505,10 +506,10 @@ def transformed(
     about: Sequence[float] = (0.0, 0.0, 0.0),
     axis: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Any:
-    """Scaled and then turned by an angle [degrees], right-handed about an axis through the point `about`, then moved by
-    `translate` [m].
+    """Scale a solid, rotate it by an angle [degrees], right-handed about an axis through the point `about`, then
+    translate it [m].
 
-    A negative factor mirrors. CommandError if something round would become oval, for a solid of a CAD file, and if a
+    A negative factor mirrors. CommandError if a round solid would become oval, for a solid of a CAD file, and if a
     number is not finite or an axis or factor is zero.
     """
     factors = np.broadcast_to(np.array(scale, np.float64), 3)

@@ -7,7 +7,7 @@ from hpcdem.pre.section.found import Found
 
 
 def read_dxf(found: Found) -> None:
-    """Polygons and lines of the model space; arcs stay arcs. Kinds that are neither are counted."""
+    """Read polygons and lines of the model space; arcs remain arcs. Other kinds are counted."""
     if found.placement.line is not None:
         raise found.refuse(
             "line applies to maps with heights (GeoJSON, shapefiles); a DXF section lies in its x-y plane"

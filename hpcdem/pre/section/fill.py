@@ -30,8 +30,9 @@ MOST_POINTS = 4 * MOST_DISCS
 
 @dataclass(frozen=True)
 class Filled:
-    """rows (n, 3): x, y, r [m]; shape (n,): which polygon each is in; overlap: the largest that is left, over the sum
-    of two radii, and beyond a boundary, over the radius."""
+    """Discs in polygons. rows (n, 3): x, y, r [m]; shape (n,): polygon of each disc; overlap: largest remaining
+    overlap, over the sum of two radii, or beyond a boundary, over the radius.
+    """
 
     rows: np.ndarray
     shape: np.ndarray
@@ -39,10 +40,10 @@ class Filled:
 
 
 def filled(section: Section, radii: np.ndarray, porosity: float, seed: int, stream: int, file: str) -> Filled:
-    """Discs of radii [m] drawn from a list, at random in the visible part of each polygon, as many as leave this
-    porosity, moved apart until they hardly overlap. The same arguments give the same bits.
+    """Fill the visible part of each polygon with discs of radii [m] drawn at random from a list, to this porosity, and
+    move them apart until they hardly overlap. Equal arguments give equal bits.
 
-    CommandError for a porosity that discs cannot have, and where a polygon is narrower than a disc.
+    CommandError for an impossible porosity, and for a polygon narrower than a disc.
     """
     if not 0.1 <= porosity < 1.0:
         raise CommandError(f"porosity: a number from 0.1 to below 1, got {porosity:g}")

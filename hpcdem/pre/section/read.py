@@ -32,22 +32,23 @@ def read(
     only: Sequence[str] = (),
     simplify: float = 0.0,
 ) -> Section:
-    """A section in metres of the model.
+    """Read a section and convert it to metres of the model.
 
     Parameters
     ----------
-    path : a file .geojson, .json, .shp, .svg, .dxf, or an image.
-    placement : coordinates of the model from those of the file.
-    legend : of an image: a file of colours and names.
-    attribute : whose value is the name of a shape; None: the first of found.NAMES. Of GeoJSON and shapefiles.
-    only : names of polygons and lines; empty: all.
-    simplify : points of boundaries may be left out where triangles of the square of this length [m] disappear; shared
-        boundaries stay shared.
+    path : file .geojson, .json, .shp, .svg, .dxf, or an image.
+    placement : conversion from the coordinates of the file to those of the model.
+    legend : for an image: file of colours and names.
+    attribute : attribute whose value is the name of a shape, for GeoJSON and shapefiles (default: the first of
+        found.NAMES).
+    only : names of polygons and lines to read (default: all).
+    simplify : length [m]; points of boundaries are removed if the triangles that disappear are smaller than its square;
+        shared boundaries remain shared.
 
     Raises
     ------
-    HpcdemError : the file cannot be read or has no shape; a polygon crosses itself.
-    CommandError : a value makes no sense.
+    HpcdemError : if the file cannot be read or has no shape, or a polygon crosses itself.
+    CommandError : if a value is invalid.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -92,7 +93,7 @@ def read(
 
 
 def summary(section: Section) -> list[str]:
-    """Extent, and areas and lengths by name."""
+    """Return the extent, and areas and lengths by name."""
     points = np.concatenate([ring.points for shape in section.shapes for ring in shape.rings])
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     lines = [f"from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"]

@@ -20,8 +20,9 @@ FORMATS = (".geojson", ".dxf", ".csv")
 
 
 def write(path: str | Path, shapes: Sequence[Shape], placement: Placement | None = None) -> None:
-    """A file of shapes; placement: in the coordinates of its file, None: in metres of the model. Arcs stay arcs in DXF
-    and become polylines elsewhere. CommandError for another ending than FORMATS."""
+    """Write shapes to a file. placement: write the coordinates of its file; None: metres of the model. Arcs remain arcs
+    in DXF and become polylines elsewhere. CommandError for an extension not in FORMATS.
+    """
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in FORMATS:

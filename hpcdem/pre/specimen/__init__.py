@@ -35,13 +35,13 @@ MM = 1e-3
 
 @dataclass(frozen=True)
 class Request:
-    """Specification of a specimen. Raises CommandError if it cannot be fulfilled.
+    """Specification of a specimen. Raises CommandError if it is invalid.
 
-    sizes [mm] and percents (mass finer) are the rows of the grading, in falling or rising order. Either `number` (of
-    grains) is given, and the box follows, or `width` [m] with number None. slenderness: height over width of the box;
-    void_ratio: area of voids over area of grains in the box. mass_exponent: 2, or 3 for the numbers of a sieve curve of
-    real grains. placement: "cells", a loose column, or "dense", within the box. cell: size of a cell over the largest
-    grain.
+    sizes [mm] and percents (mass finer) are the rows of the grading, in descending or ascending order. Give either
+    `number`, the number of grains, which determines the box, or `width` of the box [m] with number None. slenderness:
+    height over width of the box; void_ratio: area of voids over area of grains in the box. mass_exponent: 2, or 3 for
+    the numbers of a sieve curve of real grains. placement: "cells", a loose column, or "dense", within the box. cell:
+    size of a cell over the largest grain.
     """
 
     sizes: tuple[float, ...]
@@ -122,7 +122,7 @@ class Density:
 
 @dataclass(frozen=True)
 class Specimen:
-    """Grains in their places, in the order in which files list them.
+    """Grains in their positions, in the order of the files.
 
     class_of (n,) i8: row of the grading; size (n,) f8 [m]; body: outlines about (0, 0) at angle 0; x, y (n,) [m] and
     angle (n,) [rad] put them in their places; reach (n,) [m]: circle about (x, y) that holds the grain. width, height
@@ -148,7 +148,7 @@ class Specimen:
 
     @cached_property
     def outlines(self) -> Outlines:
-        """The outlines in their places."""
+        """The outlines in their positions."""
         return self.body.placed(self.x, self.y, self.angle)
 
     @cached_property
@@ -158,12 +158,12 @@ class Specimen:
 
     @property
     def area(self) -> np.ndarray:
-        """(n,) f8 [m2]"""
+        """Area of each grain (n,) [m2]."""
         return self.moments[0]
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """(m,) i8: grains of each class."""
+        """Number of grains of each class (m,)."""
         return np.bincount(self.class_of, minlength=len(self.grading.sizes))
 
     @cached_property
@@ -185,7 +185,7 @@ class Specimen:
 
 
 def make_specimen(request: Request) -> Specimen:
-    """Grains of a request. Raises CommandError where the box cannot hold them."""
+    """Make the grains of a request. Raises CommandError if the box cannot contain them."""
     curve = grading(request.sizes, request.percents)
     if request.number is not None:
         return _made(request, curve, request.number, None)

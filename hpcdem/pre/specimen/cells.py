@@ -1,4 +1,4 @@
-"""Loose placement: one grain in each cell of a square grid, the original pre-processor's way."""
+"""Loose placement: one grain in each cell of a square grid, as in the original pre-processor."""
 
 from __future__ import annotations
 

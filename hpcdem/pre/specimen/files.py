@@ -13,7 +13,7 @@ from hpcdem.pre.specimen.shapes import SIDES
 
 
 def to_ppdem(specimen: Specimen) -> PpdemGrains:
-    """Grains as PPDEM has them; polygons with the roundness of each edge."""
+    """Convert grains to the PPDEM format; polygons with the roundness of each edge."""
     if specimen.request.shape == "circle":
         return circles(specimen.x, specimen.y, specimen.size)
     o = specimen.outlines

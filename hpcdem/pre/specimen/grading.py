@@ -34,12 +34,12 @@ class Grading:
 
     @property
     def uniformity(self) -> float:
-        """Cu = d60 / d10; not a number where the curve does not reach down to 10 %."""
+        """Cu = d60 / d10; NaN if the curve does not reach down to 10 %."""
         return self.size_at(60.0) / self.size_at(10.0)
 
     @property
     def curvature(self) -> float:
-        """Cc = d30^2 / (d10 d60); not a number where the curve does not reach down to 10 %."""
+        """Cc = d30^2 / (d10 d60); NaN if the curve does not reach down to 10 %."""
         return self.size_at(30.0) ** 2 / (self.size_at(10.0) * self.size_at(60.0))
 
     def size_at(self, percent: float) -> float:

@@ -166,7 +166,7 @@ if sim.rank == 0:
 
 
 def deposit(specimen: Specimen) -> str:
-    """A script of commands: the grains fall, and come to rest between walls."""
+    """Return a script of commands in which the grains fall and settle between walls."""
     width, room = specimen.density.room
     radius, mass = _smallest(specimen)
     solid = float(specimen.area.sum())
@@ -194,7 +194,9 @@ def deposit(specimen: Specimen) -> str:
 
 
 def biaxial(specimen: Specimen) -> str:
-    """A Python program: packed between four walls at a stress, then shortened with the side stress held."""
+    """Return a Python program in which the grains are compressed between four walls to a stress, then shortened at
+    constant side stress.
+    """
     width, room = specimen.density.room
     _, mass = _smallest(specimen)
     kn = STIFFNESS * CONFINING

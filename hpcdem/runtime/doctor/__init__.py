@@ -1,8 +1,8 @@
 """Checks of host, job and folders before a run meets their faults: `hpcdem doctor` and the warnings at the start.
 
 One table of checks drives both. A check is a function of a `Machine` that yields findings; those that cost next to
-nothing and write no file are made at every start, and what is wrong goes into the log. Checks of the job look at all
-ranks and are made by rank 0; those of each host by its first rank.
+nothing and write no file are made at every start, and problems are logged. Checks of the job cover all ranks and are
+made by rank 0; those of each host by its first rank.
 """
 
 from __future__ import annotations
