@@ -288,10 +288,10 @@ def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
 
     model = reproduction.new_model()
 
-    def look() -> None:
+    def inspect() -> None:
         reproduction.see(model, sim.clock.step, diagnostics.fingerprint(sim))
 
-    sim.watchers.append(Watcher(reproduction.every, look))
+    sim.watchers.append(Watcher(reproduction.every, inspect))
 
 
 def report_end(sim: Simulation) -> None:

@@ -25,7 +25,7 @@ MAIN = ("particles", "elements")
 """Kinds of objects of a frame used by default."""
 
 
-class Looks(TypedDict, total=False):
+class Appearance(TypedDict, total=False):
     """Appearance of the objects of a picture: keywords of a layer of a view (docs/view.md)."""
 
     limits: tuple[float, float]
@@ -84,7 +84,7 @@ class Frame:
         return _with_units(self.pandas(object), self._moment, {"step": self.step, "time": self.time})
 
     def picture(
-        self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
+        self, field: str | None = None, object: str | None = None, width: int = 900, **appearance: Unpack[Appearance]
     ) -> bytes:
         """Draw the frame.
 
@@ -92,7 +92,7 @@ class Frame:
         ----------
         field, object : quantity that colours the objects that have it, or kind of object to colour.
         width : width of the picture [pixels].
-        looks : appearance of the objects: limits=(low, high), colours="blue-red", log=True ... (docs/view.md).
+        appearance : of the objects: limits=(low, high), colours="blue-red", log=True ... (docs/view.md).
 
         Returns
         -------
@@ -100,11 +100,11 @@ class Frame:
         """
         if isinstance(width, bool) or not isinstance(width, int) or width < NARROWEST:
             raise UsageError(f"width: expected a whole number of pixels from {NARROWEST} on, got {width!r}")
-        given = spelt(dict(looks), Looks.__annotations__)
+        given = spelt(dict(appearance), Appearance.__annotations__)
         for name in given:
-            if name not in Looks.__annotations__:
-                near = hint(name, Looks.__annotations__)
-                raise UsageError(f"unknown option '{name}'{near}; available: {', '.join(Looks.__annotations__)}")
+            if name not in Appearance.__annotations__:
+                near = hint(name, Appearance.__annotations__)
+                raise UsageError(f"unknown option '{name}'{near}; available: {', '.join(Appearance.__annotations__)}")
         import matplotlib
 
         from hpcdem.io.axes import CM
@@ -122,10 +122,10 @@ class Frame:
         return content.getvalue()
 
     def show(
-        self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Unpack[Looks]
+        self, field: str | None = None, object: str | None = None, width: int = 900, **appearance: Unpack[Appearance]
     ) -> Any:
         """Return `picture` as an image of IPython, for a notebook."""
-        return _needed("IPython.display").Image(self.picture(field, object, width, **looks))
+        return _needed("IPython.display").Image(self.picture(field, object, width, **appearance))
 
     def _main(self) -> str:
         for kind in (*MAIN, *self._moment.objects):

@@ -281,6 +281,6 @@ def command(method: Method, edits: bool = True) -> Method:
     return call  # type: ignore[return-value]
 
 
-def look(method: Method) -> Method:
+def query(method: Method) -> Method:
     """Wrap a command that changes nothing."""
     return command(method, edits=False)

@@ -14,7 +14,7 @@ from hpcdem import session
 from hpcdem.api.blocks import BlockCommands
 from hpcdem.api.frames import Frame, shown
 from hpcdem.api.functions import command as _command
-from hpcdem.api.functions import look as _look
+from hpcdem.api.functions import query as _query
 from hpcdem.api.particles import ParticleCommands
 from hpcdem.api.program import carried_out
 from hpcdem.commands import dem, fdem
@@ -282,7 +282,7 @@ class Simulation(ParticleCommands, BlockCommands):
         engine.watchers.append(watcher)
         return Call(self, watcher)
 
-    @_look
+    @_query
     def save(self, file: str | Path) -> None:
         """SAV, model save: write the complete state to a checkpoint: particles, blocks, or both if they are coupled."""
         if self._project is None:
@@ -380,7 +380,7 @@ class Simulation(ParticleCommands, BlockCommands):
         finally:
             self.engine.script, self.engine.position = self._session.text, 0
 
-    @_look
+    @_query
     def finish(self) -> None:
         """End the run: close histories, print the table of stages and draw the last frame. Without this call, the end
         of the program does it.
@@ -393,7 +393,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
     # ---- output of one moment --------------------------------------------------------------------------------------
 
-    @_look
+    @_query
     def write_frame(self) -> None:
         """Write ``all_<step>.vtkhdf`` and ``.dat`` of the present state."""
         from hpcdem.commands.dem import output
@@ -560,7 +560,7 @@ class Simulation(ParticleCommands, BlockCommands):
 
         return {name: Wall(*row) for name, row in self._asked(("walls",), rows).items()}
 
-    @_look
+    @_query
     def energy(self) -> dict[str, float]:
         """Return the energy budget since the first cycle after ``set(energy=n)`` [J], by the names of the columns of
         energy.csv.
@@ -571,7 +571,7 @@ class Simulation(ParticleCommands, BlockCommands):
             raise CommandError("there are no particles; energies is the budget of blocks")
         if self.engine.energy is None or self.engine.energy.start is None:
             raise CommandError("no energy budget yet: call set(energy=n), then cycle(n)")
-        return dataclasses.asdict(self.engine.energy.look(self.engine))
+        return dataclasses.asdict(self.engine.energy.evaluate(self.engine))
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Return the pairs in contact of the whole model, on every rank, in the order of ids: id1 id2, normal force fn
@@ -630,7 +630,7 @@ class Simulation(ParticleCommands, BlockCommands):
         if running is None:
             return make()
         if not running.keeps_calls:
-            return running.look(make) if self.engine.coupled and not again else make()
+            return running.query(make) if self.engine.coupled and not again else make()
         asleep = self._asleep and not again
         value = running.ask((self.engine.number, *key), make, None if asleep else make)
         if asleep and key[0] == "set" and "outdir" in key[2]:
@@ -937,7 +937,7 @@ class Coupling:
         running = session.current().interpreter
         if running is None:
             return make()
-        return running.ask(("coupling", key), make) if running.keeps_calls else running.look(make)
+        return running.ask(("coupling", key), make) if running.keeps_calls else running.query(make)
 
 
 def _parted(what: str) -> UsageError:

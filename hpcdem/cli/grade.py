@@ -77,7 +77,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
     """Collective: rank 0 does it. HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
 
-    on_first(comm, lambda: look(options) if options["read"] else make(options))
+    on_first(comm, lambda: show_file(options) if options["read"] else make(options))
 
 
 def request(options: dict[str, Any], curve: Grading) -> Request:
@@ -196,7 +196,7 @@ def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
 # --- looking into a file -----------------------------------------------------------------------------------------
 
 
-def look(options: dict[str, Any]) -> None:
+def show_file(options: dict[str, Any]) -> None:
     """Read a PPDEM file, sort its grains into classes, print and draw them."""
     from hpcdem.core.errors import UsageError
     from hpcdem.io.ppdem import read_ppdem

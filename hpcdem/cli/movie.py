@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE
-from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, processes, style_of
+from hpcdem.cli.pictures import ManualCommand, appearance, common_view, number, processes, style_of
 from hpcdem.core.comm import Comm
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ PAGE = 17.0
               "(compressive), plastic strain, temperature; for fluid in joints pressure, saturation, aperture, "
               "velocity, proppant concentration; both: cracks and stress [all available].")  # fmt: skip
 @number("max_workers", None, "Number of drawing processes [one per core].", POSITIVE)
-@looks
+@appearance
 def movie(**options: Any) -> None:
     """Make a film of all frames in DIR, of particles or of blocks, drawn with the same limits.
 
@@ -204,10 +204,10 @@ def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) ->
             ("ymin", min(v.bottom for v in views)), ("ymax", max(v.top for v in views)),
         )
     ]  # fmt: skip
-    looks = blocks.Looks(
+    appearance = blocks.Appearance(
         PANELS_SHOWN.get(options["show"]) or tuple(name for name in blocks.PANELS if name in panels), PAGE,
         options["fontsize"],
         2.0 * options["size"] * 2.54 / PAGE, style_of(options, options["folder"], PAGE, 1.0).title,
         {name: (min(low for low, _ in them), max(high for _, high in them)) for name, them in spans.items()},
     )  # fmt: skip
-    return [Job(file, scratch / f"{k:06d}.png", looks, View(*limits)) for k, file in enumerate(files)]
+    return [Job(file, scratch / f"{k:06d}.png", appearance, View(*limits)) for k, file in enumerate(files)]

@@ -126,7 +126,7 @@ OPTIONS = (
 """Options for the appearance of pictures."""
 
 
-def looks(function: Callable[..., Any]) -> Callable[..., Any]:
+def appearance(function: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of a picture."""
     for option in reversed(OPTIONS):
         function = option(function)
@@ -142,7 +142,7 @@ def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> 
     """The style that the options ask for. Raises HpcdemError for a colour file that is not there or not right."""
     from hpcdem.core.errors import UsageError
     from hpcdem.io import colours
-    from hpcdem.post.layers import Look
+    from hpcdem.post.layers import Appearance
     from hpcdem.post.plots import SIDES, Style
 
     layers = {"ballplot": "bfill", "bondplot": "bondplot", "surfaceshow": "surface", "wallshow": "wall"}
@@ -164,7 +164,7 @@ def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> 
         font=options["fontsize"],
         dpi=dpi,
         frame_line=options["linewidth"],
-        look=Look(palette, options["linewidth"]),
+        appearance=Appearance(palette, options["linewidth"]),
         sides=frozenset(side for side in SIDES if options[f"{side}show"]),
         move=(options["xmove"], options["ymove"]),
         limits={side: value for side, value in limits.items() if value is not None},

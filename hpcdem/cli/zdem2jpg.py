@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH, POSITIVE
-from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, looks, number, processes, style_of
+from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, appearance, number, processes, style_of
 from hpcdem.core.comm import Comm
 from hpcdem.runtime import launch
 
@@ -23,7 +23,7 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
 
 @click.command(cls=ManualCommand, context_settings=HELP, no_args_is_help=True)
 @click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
-@looks
+@appearance
 @number("dpi", 600.0, "Dots per inch [600].", POSITIVE)
 @number("pagesize", 14.0, "Width of the picture, cm [14].", POSITIVE)
 @click.option(
@@ -80,7 +80,7 @@ def work(comm: Comm, log: Log, options: dict[str, Any]) -> None:
             log.warn(others)
         if not files:
             raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {folder}")
-        style = replace(style, look=replace(style.look, of_field=of_field(options, files)))
+        style = replace(style, appearance=replace(style.appearance, of_field=of_field(options, files)))
         return [Job(file, file.with_suffix(f".{kind}"), style) for file in files for kind in options["formats"]]
 
     jobs = on_first(comm, plan)

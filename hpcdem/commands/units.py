@@ -36,7 +36,7 @@ def declared(before: str, name: str, log: Any, late: bool) -> str:
     return new
 
 
-def look(name: str, log: Any, given: Iterable[Given]) -> None:
+def check(name: str, log: Any, given: Iterable[Given]) -> None:
     """Warn of values that are unlikely in these units, "" none, once per property."""
     if not name or log is None:
         return

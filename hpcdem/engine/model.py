@@ -216,7 +216,7 @@ class Model(ABC):
         cell: np.ndarray,
         histories: H,
         tables: Sequence[np.ndarray],
-        room: tuple[float, float] | None = None,
+        extent: tuple[float, float] | None = None,
         cost: np.ndarray | float = 1.0,
         least: int = 1,
         left: Callable[[np.ndarray, np.ndarray], object] = lambda leave, to: None,
@@ -224,12 +224,12 @@ class Model(ABC):
         """Move strip boundaries if that pays, then send rows of the tables (n, w) f8 and their histories to the owners
         of their columns.
 
-        room, cost, least: see `Ownership.renew`; left: receives the destinations. Returns cells, histories and tables
+        extent, cost, least: see `Ownership.renew`; left: receives the destinations. Returns cells, histories and tables
         of the rows owned now. Collective.
         """
         with self.timers("balance"):
             owners, side = self.ownership, self.rebuild_state.side
-            owners.renew(owners.places(cell), side, self.clock.step, self.timers.seconds(), room, cost, least)
+            owners.renew(owners.places(cell), side, self.clock.step, self.timers.seconds(), extent, cost, least)
         with self.timers("migrate"):
             leave = owners.strays(cell)
             migration = Migration(self.comm, len(cell), leave, owners.owner_of(owners.places(cell[leave])))

@@ -84,13 +84,13 @@ class Ownership:
         side: float,
         step: int,
         busy: float,
-        room: tuple[float, float] | None,
+        extent: tuple[float, float] | None,
         cost: np.ndarray | float = 1.0,
         least: int = 1,
     ) -> None:
         """Choose boundaries for particles (or elements) at places (n,) i8 of this rank. Collective.
 
-        busy: seconds of work of this rank so far; room: x range of possible positions [m], if known; cost: (n,),
+        busy: seconds of work of this rank so far; extent: x range of possible positions [m], if known; cost: (n,),
         relative cost of each row, if known; least: smallest number of columns of a rank. Raises UsageError if a new
         model has fewer columns than ranks. A model that lost columns later, or was restored with fewer, continues with
         idle ranks.
@@ -108,7 +108,7 @@ class Ownership:
             if found is None:
                 return
             weight = found * cost
-        self.borders = self._cut(place, weight, least, room, first_time and step == 0)
+        self.borders = self._cut(place, weight, least, extent, first_time and step == 0)
         self.wanted = False
         self._busy, self._step = busy, step
 
@@ -123,14 +123,19 @@ class Ownership:
             self.borders = strips.separate(self.borders, least)
 
     def _cut(
-        self, place: np.ndarray, weight: np.ndarray | float, least: int, room: tuple[float, float] | None, starts: bool
+        self,
+        place: np.ndarray,
+        weight: np.ndarray | float,
+        least: int,
+        extent: tuple[float, float] | None,
+        starts: bool,
     ) -> np.ndarray:
         """Return boundaries with equal weight between them; starts: too many ranks are rejected. Collective."""
         first, columns = self._span(place)
         if columns == 0:
             first, columns = 0, 1
         elif starts or self.around:
-            self._refuse_too_many_ranks(columns, room)
+            self._refuse_too_many_ranks(columns, extent)
         total = np.zeros(min(columns, MOST_COLUMNS))
         np.add.at(total, np.minimum(place - first, len(total) - 1), weight)
         self.comm.sum_into(total)
@@ -161,10 +166,10 @@ class Ownership:
         first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
         return (first, columns) if columns > 0 else (0, 0)
 
-    def _refuse_too_many_ranks(self, columns: int, room: tuple[float, float] | None) -> None:
+    def _refuse_too_many_ranks(self, columns: int, extent: tuple[float, float] | None) -> None:
         """Raise UsageError if a rank would never have a column: the job was started with too many ranks."""
-        if room is not None and not self.around:
-            ends, _ = strips.cells(np.array(room), np.zeros(2), self.side)
+        if extent is not None and not self.around:
+            ends, _ = strips.cells(np.array(extent), np.zeros(2), self.side)
             columns = max(columns, int(ends[1] - ends[0]) + 1)
         if columns < self.comm.size:
             raise UsageError(
@@ -228,7 +233,12 @@ class Curve(Ownership):
         pass
 
     def _cut(
-        self, place: np.ndarray, weight: np.ndarray | float, least: int, room: tuple[float, float] | None, starts: bool
+        self,
+        place: np.ndarray,
+        weight: np.ndarray | float,
+        least: int,
+        extent: tuple[float, float] | None,
+        starts: bool,
     ) -> np.ndarray:
         mine, of = np.unique(place, return_inverse=True)
         total = np.bincount(of, np.broadcast_to(weight, len(place)), len(mine))

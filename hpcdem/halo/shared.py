@@ -41,7 +41,7 @@ class Nodes:
         self.host, self.leads = host, leads
         self.folders = folders or ("/dev/shm", tempfile.gettempdir())
         self.warn: Callable[[str], None] | None = None
-        self._told = self._making = False
+        self._warned = self._making = False
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
         if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -117,8 +117,8 @@ class Nodes:
         return []
 
     def _notice(self, size: int) -> None:
-        if self.warn is not None and not self._told:
-            self._told = True
+        if self.warn is not None and not self._warned:
+            self._warned = True
             self.warn(
                 f"the {self.host.size} ranks of a node keep separate copies ({size / 2**20:.0f} MiB so far), because "
                 f"{' or '.join(self.folders)} has no space to share them, or /proc hides the ranks from each other. "
@@ -151,8 +151,8 @@ def _sendable(error: Exception) -> Exception:
 
 def _write(file: int, content: np.ndarray) -> None:
     os.posix_fallocate(file, 0, len(content))  # what there is no space for must not end in a bus error
-    with mmap.mmap(file, len(content)) as room:
-        room[:] = content.data
+    with mmap.mmap(file, len(content)) as view:
+        view[:] = content.data
 
 
 def _identity(file: int) -> tuple[int, int]:

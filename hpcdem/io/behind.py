@@ -115,7 +115,7 @@ class Deliveries:
         if file is not None:
             self._files.append(file)
 
-    def look(self, comm: Comm) -> None:
+    def poll(self, comm: Comm) -> None:
         """Raise HpcdemError on all ranks if a file is known to have failed. Collective, waits for no disk."""
         if self._expected:
             comm.agree(self._first_error())

@@ -50,7 +50,7 @@ class Sources:
         self.lock = threading.Lock()
         self._curves: Curves | None = None
         self.coming = {path for path in self.paths if self._to_be_made(path)}
-        self.look()
+        self.refresh()
         for path in self.paths:
             if empty or not path.is_dir() or run_folder.running(path) is not None or path in self.coming:
                 continue
@@ -79,7 +79,7 @@ class Sources:
         if failure is not None:
             raise failure
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """See which frames there are now."""
         found: list[Source] = []
         for path in self.paths:
@@ -146,7 +146,7 @@ class Sources:
     def state(self) -> dict[str, Any]:
         """Frames by source, with what tells whether the last one was written again; of the first folder whether a run
         writes there, its progress, and its histories."""
-        self.look()
+        self.refresh()
         answer: dict[str, Any] = {
             "sources": [
                 {
@@ -179,7 +179,7 @@ class Sources:
             self._curves = Curves(folder)
         return self._curves
 
-    def tell(self, what: Any) -> str:
+    def send_signal(self, what: Any) -> str:
         """Ask the run that writes into the first folder to stop after a checkpoint, or to save one: the same signals as
         from a terminal. HpcdemError where none runs on this machine."""
         if what not in SIGNALS:

@@ -115,7 +115,7 @@ class Viewer:
             "pick": self._in_turn(self.pick),
             "curves": self.curves,
             "presets": lambda wanted: as_json({"presets": self.sources.curves().presets()}),
-            "tell": lambda wanted: as_json({"said": self.sources.tell(wanted.get("what"))}),
+            "tell": lambda wanted: as_json({"said": self.sources.send_signal(wanted.get("what"))}),
             "view": lambda wanted: as_json(self._view(wanted).model_dump()),
             "file": self._one_of_few(self.file),
         }

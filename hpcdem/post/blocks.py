@@ -43,7 +43,7 @@ _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the pa
 
 
 @dataclass(frozen=True)
-class Looks:
+class Appearance:
     """Appearance of a figure of blocks.
 
     panels: names of PANELS (default: cracks, stress, and if available plastic strain and fluid pressure; with heat
@@ -60,7 +60,7 @@ class Looks:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
-USUAL = Looks()
+USUAL = Appearance()
 
 
 def view(state: MeshState) -> View:
@@ -173,32 +173,32 @@ def panels_of(state: MeshState) -> tuple[str, ...]:
     return CRACKS, STRESS, *wet
 
 
-def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
+def plot(state: MeshState, path: str | os.PathLike, appearance: Appearance = USUAL, seen: View | None = None) -> Path:
     """Write the picture of a frame, see `saved.write`."""
-    return write(lambda: draw(state, looks, seen), path, looks.dpi)
+    return write(lambda: draw(state, appearance, seen), path, appearance.dpi)
 
 
-def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
+def plot_file(source: Path, path: Path, appearance: Appearance, seen: View | None = None) -> None:
     """Draw the frame in a file."""
-    plot(read_mesh_frame(source), path, looks, seen)
+    plot(read_mesh_frame(source), path, appearance, seen)
 
 
-def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
+def draw(state: MeshState, appearance: Appearance = USUAL, seen: View | None = None) -> Any:
     """Return a matplotlib Figure with the panels, side by side for tall models, otherwise stacked."""
     from matplotlib.figure import Figure
 
     seen = replace(view(state) if seen is None else seen, system=state.units)
-    panels = looks.panels or panels_of(state)
+    panels = appearance.panels or panels_of(state)
     ratio = seen.height / seen.width
     beside = len(panels) > 1 and ratio > 0.7
     across = len(panels) if beside else 1
-    k = looks.font / 9.0
+    k = appearance.font / 9.0
     left, bottom, top, gap, bar = (k * length for length in (_LEFT, _BOTTOM, _TOP, _GAP, _BAR))
     after = [gap if panel == CRACKS else bar for panel in panels]  # room for colours, or none
     between = sum(after[:-1]) if beside else 0.0
-    room = (looks.page - left - bar - between) / across
+    room = (appearance.page - left - bar - between) / across
     if room < 1.0:
-        raise UsageError(f"a page of {looks.page:g} cm is too small for letters of {looks.font:g} points")
+        raise UsageError(f"a page of {appearance.page:g} cm is too small for letters of {appearance.font:g} points")
     width = min(room, 21.0 / ratio)
     height = width * ratio
     down = 1 if beside else len(panels)
@@ -208,44 +208,44 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         x = left + (number * width + sum(after[:number]) if beside else 0.0)
         y = bottom + (0 if beside else (down - 1 - number) * (height + top + 0.3 * gap))
         axes = figure.add_axes((x / page[0], y / page[1], width / page[0], height / page[1]))
-        frame(axes, seen, looks, first=number == 0 or not beside, last=beside or number == down - 1)
+        frame(axes, seen, appearance, first=number == 0 or not beside, last=beside or number == down - 1)
         if panel == CRACKS:
-            cracks(axes, state, looks.font, width / seen.width)
+            cracks(axes, state, appearance.font, width / seen.width)
         else:
             shown = COLOURED[panel]
-            span = looks.ranges.get(panel) or shown.range(state)
+            span = appearance.ranges.get(panel) or shown.range(state)
             filled = coloured(axes, state, panel, span, width / seen.width)
             if number == 0:  # no panel of cracks, which would show them
                 supports(axes, state)
             colours = figure.add_axes(
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
-            _bar(figure, colours, filled, looks.font)
-            axes.set_title(titled(shown, span, state), loc="right", fontsize=0.9 * looks.font, pad=3.0)
+            _bar(figure, colours, filled, appearance.font)
+            axes.set_title(titled(shown, span, state), loc="right", fontsize=0.9 * appearance.font, pad=3.0)
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
-        axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
-    if looks.title is not None:
-        text = units.stamped(looks.title, state.step, state.time)
-        figure.text(0.99, 0.995, text, fontsize=looks.font, ha="right", va="top", parse_math=False)
+        axes.set_title(label, loc="left", fontsize=appearance.font, pad=3.0)
+    if appearance.title is not None:
+        text = units.stamped(appearance.title, state.step, state.time)
+        figure.text(0.99, 0.995, text, fontsize=appearance.font, ha="right", va="top", parse_math=False)
     return figure
 
 
-def panel(axes: Any, state: MeshState, seen: View, width: float, looks: Looks = USUAL) -> list[Any]:
+def panel(axes: Any, state: MeshState, seen: View, width: float, appearance: Appearance = USUAL) -> list[Any]:
     """Draw the cracks of a model in axes of a width [cm]; return the entries of a legend."""
-    frame(axes, seen, looks, first=True, last=True)
+    frame(axes, seen, appearance, first=True, last=True)
     return _cracks(axes, state, width / seen.width)
 
 
-def frame(axes: Any, seen: View, looks: Looks, first: bool, last: bool) -> None:
+def frame(axes: Any, seen: View, appearance: Appearance, first: bool, last: bool) -> None:
     size, unit = seen.unit
     axes.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
     for axis, ticks, name, shown in zip((axes.xaxis, axes.yaxis), seen.ticks(), "xy", (last, first), strict=True):
         axis.set_ticks([v * size for v in ticks.major], labels=ticks.labels if shown else [])
         axis.set_ticks([v * size for v in ticks.minor], minor=True)
-        axis.set_tick_params(labelsize=looks.font, width=0.6, length=3.5)
+        axis.set_tick_params(labelsize=appearance.font, width=0.6, length=3.5)
         axis.set_tick_params(which="minor", width=0.5, length=1.8)
         if shown:
-            axis.set_label_text(f"{name} ({unit})", fontsize=looks.font)
+            axis.set_label_text(f"{name} ({unit})", fontsize=appearance.font)
     for spine in axes.spines.values():
         spine.set_linewidth(0.6)
 

@@ -26,7 +26,7 @@ BALL = 3.0
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """Appearance of particles. palette (10, 3): colours by number; line: width of walls and of the surface in points;
     of_field: field that colours particles instead of their numbers.
     """
@@ -36,43 +36,43 @@ class Look:
     of_field: ViewLayer | None = None
 
 
-USUAL = Look()
+USUAL = Appearance()
 
 
-def balls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def balls(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw filled discs of true size in the colours of the manual."""
-    _discs(frame, ax, look, 0.0)
+    _discs(frame, ax, appearance, 0.0)
 
 
-def outlines(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def outlines(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw circles of true size in the colours of the manual."""
-    _discs(frame, ax, look, 0.3)
+    _discs(frame, ax, appearance, 0.3)
 
 
-def _discs(frame: Frame, ax: Any, look: Look, line: float) -> None:
+def _discs(frame: Frame, ax: Any, appearance: Appearance, line: float) -> None:
     from hpcdem.post.discs import Discs
 
     columns = frame.tables["particles"].columns
     if not len(frame.tables["particles"]):
         return
     places = np.stack([columns["x"], columns["y"]], axis=1)
-    shades, kind = look.palette, colours.numbers(columns["color"])
-    if (found := coloured(frame, look)) is not None:
+    shades, kind = appearance.palette, colours.numbers(columns["color"])
+    if (found := coloured(frame, appearance)) is not None:
         shades, kind = found.shades, found.kind
     ax.add_collection(Discs(places, columns["radius"], shades, kind, line), autolim=False)
 
 
-def coloured(frame: Frame, look: Look) -> Painted | None:
+def coloured(frame: Frame, appearance: Appearance) -> Painted | None:
     """Return the colours of particles by a field, None without one."""
-    if look.of_field is None:
+    if appearance.of_field is None:
         return None
     from hpcdem.post.view.moment import of_particles
     from hpcdem.post.view.scene import painted
 
-    return painted(of_particles(frame), look.of_field, view(frame))
+    return painted(of_particles(frame), appearance.of_field, view(frame))
 
 
-def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def walls(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw walls in their colours, and the sides of the BOX that are not the frame of the picture."""
     p1, p2 = (np.asarray(frame.walls[p], dtype=float).reshape(-1, 2) for p in ("p1", "p2"))
     shown = np.ones(len(p1), bool)
@@ -82,11 +82,11 @@ def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
             on_edge = (np.abs(p1[:, axis] - limit) < near) & (np.abs(p2[:, axis] - limit) < near)
             shown &= ~(on_edge & np.isin(frame.walls["id"], [*sides_of_box(frame.walls["id"])]))
     if shown.any():
-        shades = look.palette[colours.numbers(frame.walls["color"])]
-        _lines(ax, p1[shown], p2[shown], shades[shown], look.line)
+        shades = appearance.palette[colours.numbers(frame.walls["color"])]
+        _lines(ax, p1[shown], p2[shown], shades[shown], appearance.line)
 
 
-def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def surface(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw the surface line of the model, ignoring detached particles and particles that represent walls."""
     from hpcdem.post import surface as tops
 
@@ -103,10 +103,10 @@ def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     # Fine enough to follow the discs, unless they are spread over an odd size of land.
     spacing = max(0.2 * usual, float(np.ptp(x)) / 100_000)
     line = tops.surface(x, y, radius, max(BALL * usual, 2.0 * spacing), spacing)
-    _polylines(ax, [line], INK, 0.75 * look.line)
+    _polylines(ax, [line], INK, 0.75 * appearance.line)
 
 
-def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def bonds(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw bonds from centre to centre: red in tension, blue in compression, dark without force."""
     table = frame.tables["bonds"].columns
     places, (first, second) = _ends(frame, "bonds")
@@ -114,7 +114,7 @@ def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     _lines(ax, places[first], places[second], shades, 0.35)
 
 
-def bond_states(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def bond_states(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw all contacts from centre to centre: black not bonded, red bonded in tension, blue bonded in compression."""
     bonded = frame.tables["bonds"].columns
     places, (first, second) = _ends(frame, "contacts")
@@ -122,13 +122,13 @@ def bond_states(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     glued = np.stack(_ends(frame, "bonds")[1], axis=1)
     size = max(len(places), 1)
     free = ~np.isin(pairs[:, 0] * size + pairs[:, 1], glued[:, 0] * size + glued[:, 1])
-    width = 0.5 * look.line
+    width = 0.5 * appearance.line
     pulled = bonded.get("fn", np.zeros(0)) < 0.0
     for chosen, shade in ((pairs[free], "black"), (glued[~pulled], COMPRESSION), (glued[pulled], TENSION)):
         _lines(ax, places[chosen[:, 0]], places[chosen[:, 1]], shade, width)
 
 
-def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def forces(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw contact forces from centre to centre; the thickest line is the force that only one in 200 exceeds."""
     table = frame.tables["contacts"].columns
     places, (first, second) = _ends(frame, "contacts")
@@ -139,7 +139,7 @@ def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
         _lines(ax, places[first[shown]], places[second[shown]], INK, width[shown])
 
 
-def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def ids(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw the id in each particle; omitted if there are too many to read."""
     columns = frame.tables["particles"].columns
     if len(columns["gid"]) > MOST_LABELS:
@@ -148,7 +148,7 @@ def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
         ax.text(x, y, str(gid), fontsize=2.0, ha="center", va="center", clip_on=True)
 
 
-def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def rotations(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw a radius in each particle that was horizontal when the particle was created."""
     c = frame.tables["particles"].columns
     centre = np.stack([c["x"], c["y"]], axis=1)
@@ -156,7 +156,7 @@ def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     _lines(ax, centre, rim, INK, 0.3)
 
 
-def mesh(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+def mesh(frame: Frame, ax: Any, appearance: Appearance = USUAL) -> None:
     """Draw a square grid of twice the largest diameter, approximately the cells of the neighbour search."""
     radius = frame.tables["particles"].columns["radius"]
     if not len(radius):

@@ -16,7 +16,7 @@ from hpcdem.core.units import stamped
 from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
-from hpcdem.post.layers import USUAL, Look, coloured
+from hpcdem.post.layers import USUAL, Appearance, coloured
 from hpcdem.post.saved import write
 
 PAGE_WIDTH = 17.0
@@ -47,7 +47,7 @@ class Style:
     font: float = FONT
     dpi: float = 300.0
     frame_line: float = 0.6
-    look: Look = USUAL
+    appearance: Appearance = USUAL
     sides: frozenset[str] = frozenset(SIDES)
     move: tuple[float, float] = (0.0, 0.0)
     limits: dict[str, float] = field(default_factory=dict)  # of SIDES, after the move; those missing by the model
@@ -118,7 +118,7 @@ def draw_frame(
     ax.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
     for word, draw in LAYERS.items():
         if word in what:
-            draw(frame, ax, style.look)
+            draw(frame, ax, style.appearance)
     _draw_axes(ax, seen, style)
     if style.title is not None:
         text = stamped(style.title, frame.step, frame.time)
@@ -151,7 +151,7 @@ def frame_figure(
     growth = style.font / FONT
     left, right, bottom, top = (growth * margin for margin in _MARGINS)
     left += growth * _DIGIT * max(map(len, style.ticks(seen)[1].labels), default=0)
-    bar = coloured(frame, style.look)
+    bar = coloured(frame, style.appearance)
     right += growth * BAR if bar is not None and bar.scale is not None else 0.0
     available = style.page * CM - left - right, style.page * CM * TALLEST - bottom - top
     if min(available) < 0.5 * CM:
@@ -185,6 +185,6 @@ def plot_frame(
 def plot_file(source: Path, path: Path, style: Style, seen: View | None = None) -> None:
     """Draw the frame of a file in a style. Serial. Raises HpcdemError."""
     tables = ["particles", *(("contacts", "bonds") if {"bondplot", "bondc", "cforce"} & {*style.what} else ())]
-    if style.look.of_field is not None:  # stress comes from all of them
+    if style.appearance.of_field is not None:  # stress comes from all of them
         tables = ["particles", "contacts", "bonds", "wall_contacts"]
     plot_frame(read_frame(source, tables), path, style.dpi, style.what, style, seen)

@@ -34,7 +34,7 @@ class Job:
 
     source: Path
     picture: Path
-    style: Style | blocks.Looks
+    style: Style | blocks.Appearance
     seen: View | None = None
 
     @property
@@ -45,7 +45,7 @@ class Job:
     def __call__(self) -> None:
         """Draw. Raises HpcdemError that names one of the files."""
         try:
-            if isinstance(self.style, blocks.Looks):
+            if isinstance(self.style, blocks.Appearance):
                 blocks.plot_file(self.source, self.picture, self.style, self.seen)
             else:
                 plot_file(self.source, self.picture, self.style, self.seen)

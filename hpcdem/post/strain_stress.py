@@ -207,7 +207,7 @@ class Snapshot:
     walls: dict[str, np.ndarray]
 
 
-def look(path: Path, options: Options) -> Snapshot:
+def read_snapshot(path: Path, options: Options) -> Snapshot:
     """Read a frame. Raises HpcdemError."""
     frame = read_frame(path, periodic=False)
     p = frame.tables["particles"].columns
@@ -477,7 +477,7 @@ def _round(
 ) -> _Last:
     mine = first + comm.rank
     file = frames[mine] if mine < len(frames) else None
-    now = _each(comm, lambda: look(file.path, options) if file else None)
+    now = _each(comm, lambda: read_snapshot(file.path, options) if file else None)
     arrived = _to_next(comm, packed(now) if now else last.packed[:0])
     before = Earlier(frames[mine - 1].path.stem, last.packed if comm.rank == 0 else arrived) if now and mine else None
     found = _each(comm, lambda: link(before, now, options, sums) if before and now else None)

@@ -111,7 +111,7 @@ def _compile(place: Path, warm_ups: Mapping[str, Callable[[], None]], cores: fro
             return ""
         progress = _Progress(log)
         problem = _compile_beside(list(missing.values()), cores, progress)
-        with progress.told(), kept.warming():
+        with progress.announced(), kept.warming():
             for kind, warm in missing.items():
                 warm()  # what the processes could not know of, and all of it if there were none
                 if not kept.unkept:
@@ -168,7 +168,7 @@ class _Progress:
         self.log, self.began, self.done = log, time.monotonic(), 0
         self.last = -math.inf
 
-    def tell(self, done: int, total: int) -> None:
+    def update(self, done: int, total: int) -> None:
         """Unless it has just done so."""
         now = time.monotonic()
         if self.log is None or total == 0 or now - self.last < QUIET_SECONDS:
@@ -183,7 +183,7 @@ class _Progress:
         self.last = now
 
     @contextlib.contextmanager
-    def told(self) -> Iterator[None]:
+    def announced(self) -> Iterator[None]:
         """While this process compiles, which does not know how many there are."""
         from numba.core import event
 
@@ -210,7 +210,7 @@ def _compile_beside(warm_ups: list[Callable[[], None]], cores: frozenset[int], p
     if count < 2:
         return ""
     try:
-        return compile_in_processes(warm_ups, count, cores, progress.tell)
+        return compile_in_processes(warm_ups, count, cores, progress.update)
     except (OSError, pickle.PicklingError, AttributeError) as error:  # no more processes; a warm-up of a closure
         return f"{type(error).__name__}: {error}"
 

@@ -72,7 +72,7 @@ def refuse_file(folder: Path, comm: Comm) -> None:
     """Collective: UsageError if something that is no folder stands where a folder of results, or one above it, would be
     made."""
 
-    def look() -> None:
+    def inspect() -> None:
         there = next((place for place in (folder, *folder.absolute().parents) if os.path.lexists(place)), None)
         if there is not None and not there.is_dir():
             kind = "a broken link" if there.is_symlink() and not there.exists() else "a file"
@@ -80,7 +80,7 @@ def refuse_file(folder: Path, comm: Comm) -> None:
                 f"cannot make the folder {folder} for the results: {there} is {kind}. Choose another with --outdir"
             )
 
-    on_first(comm, look)
+    on_first(comm, inspect)
 
 
 def enter(

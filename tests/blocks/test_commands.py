@@ -134,7 +134,7 @@ def test_contacts_say_who_presses_whom():
     assert np.abs(found["y"] - 0.2).max() < 0.1 and found["force_x"].sum() == pytest.approx(0.0, abs=1e-2)
 
 
-def test_what_is_taken_out_in_motion_lets_go_slowly():
+def test_what_is_removed_in_motion_is_released_slowly():
     """A loaded plate loses its middle: at once it rings, over several periods it does not."""
     swings = []
     for relax in (0.0, 2e-3):

@@ -157,7 +157,7 @@ def test_apart_or_only_touching_there_is_no_force():
         assert (forces(UPPER + [0.0, shift], LOWER, friction=1.0, history=history) == 0.0).all()
 
 
-def test_damped_contact_loses_energy_on_the_way_out():
+def test_damped_contact_loses_energy_during_unloading():
     """sigma = min(sigma_try, T) in; min(sigma_try, T (o / o_max)^b) out."""
     depth = np.concatenate([np.linspace(0.0, 0.02, 40), np.linspace(0.02, 0.0, 40)[1:]])
     largest = np.zeros((5, 12))

@@ -36,7 +36,7 @@ def pressed_in(kind: str, layers: int, x0: float, faces: tuple[float, float], **
 
 
 @pytest.mark.parametrize("kind, layers, x0", [("cross", 1, 0.2), ("cross", 3, 0.213), ("quad", 2, 0.213)])
-def test_both_surfaces_together_bear_t(kind, layers, x0):
+def test_both_surfaces_together_carry_t(kind, layers, x0):
     """Up to T as without it, then T over the width, whatever the altitudes on both sides are and however elements lie
     on each other. (Ends: below 1 %.)"""
     found, free = (pressed_in(kind, layers, x0, (most, most)) for most in (LIMIT, 1e30))

@@ -148,7 +148,7 @@ def test_rubble_without_friction_and_damping_keeps_its_energy():
 
 
 @pytest.mark.parametrize("glances, late", [(True, 0), (False, 1)])
-def test_who_speeds_up_between_two_looks_is_seen(monkeypatch, glances, late):
+def test_who_speeds_up_between_two_checks_is_seen(monkeypatch, glances, late):
     """A body that is set in motion unseen, by half the skin of the lists in thirty steps: they are made again in time,
     as somebody glances every few steps."""
     if not glances:

@@ -186,7 +186,7 @@ def test_small_strains_close_to_rounding(kind, damping):
     assert found["relative"] < 1e-12, found
 
 
-def test_what_is_taken_out_while_storage_waits_to_be_sorted():
+def test_what_is_removed_while_storage_waits_to_be_sorted():
     """Elements are removed right after a step that scheduled a rebuild: their energy is booked under commands, as it is
     one step earlier, and the account changes no bit."""
 

@@ -149,7 +149,7 @@ def test_a_beam_that_bends_far():
     assert farthest(sim, slow) < 1e-6
 
 
-def test_what_was_taken_out_and_left_forces_behind():
+def test_what_was_removed_and_left_forces_behind():
     """The forces left behind have died down in equilibrium: the state is that of a model without these elements."""
     sim, gone = leaning("mixed", True), leaning("mixed", True)
     hole = np.flatnonzero(np.hypot(*(sim.mesh.centroids() - [0.4, 0.3]).T) < 0.12)
@@ -344,7 +344,7 @@ def test_far_from_the_origin():
 
 
 @pytest.mark.parametrize("kind, with_joints", [("cross", False), ("quad", False), ("mixed", True)])
-def test_motion_that_goes_on_from_there_is_none(kind, with_joints):
+def test_motion_that_continues_from_there_is_none(kind, with_joints):
     """Loads stay and motion begins: what moves is rounding, 1e-12 of the elastic energy, and stresses stay. With
     contact armed, too."""
     sim = leaning(kind, with_joints)
@@ -359,7 +359,7 @@ def test_motion_that_goes_on_from_there_is_none(kind, with_joints):
     assert sim.clock.time > 0.0
 
 
-def test_in_dynamic_mode_time_stands_still_and_the_budget_calls_it_a_command():
+def test_in_dynamic_mode_time_is_at_rest_and_the_budget_calls_it_a_command():
     sim = leaning("cross")
     diagnostics.account_energy(sim)
     sim.step()

@@ -128,7 +128,7 @@ def torn(collision: bool = True) -> Blocks:
     return sim
 
 
-def test_events_do_not_depend_on_who_looks_when(tmp_path):
+def test_events_do_not_depend_on_the_moment_of_queries(tmp_path):
     """Times are those of the clock at the step of breaking, also where the time step changes; looking at every step
     changes nothing, nor does a checkpoint between breaking and the next list."""
     quiet, looked = torn(), torn()

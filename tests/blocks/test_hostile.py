@@ -125,7 +125,7 @@ def test_a_table_in_use_stays():
         sim.remove_table("load")
 
 
-def test_steps_go_on_without_a_table_that_conditions_had():
+def test_steps_continue_without_a_table_that_conditions_had():
     sim = model(rectangle(2, 2, 1.0, 1.0))
     sim.table("load", [(0.0, 1.0)])
     faces = sim.mesh.edges().faces[~sim.mesh.edges().inner][:, 0]
@@ -187,7 +187,7 @@ class Heard:
         self.said.setdefault(key, text)
 
 
-def test_joints_too_brittle_for_their_mesh_are_told():
+def test_joints_too_brittle_for_their_mesh_are_reported():
     """o_t = gf1 / (0.386 T) below a tenth of o_p = 2 h T / P; ordinary ones are not named."""
     for gf1, told in ((50.0, False), (1e-3, True)):
         heard = Heard()

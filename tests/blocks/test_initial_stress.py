@@ -139,7 +139,7 @@ class Log:
 
 
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed", "tets", "hexes"])
-def test_a_stress_beyond_the_strength_is_said(kind):
+def test_a_stress_beyond_the_strength_is_reported(kind):
     """xx -6, yy -10 MPa: within the strength with zz of plane strain, and rock that is held stays as it is; with zz 0
     it is 10 - 2 c sqrt(N) beyond, and in tension by 1.9 MPa. Said once, with count, place and how far, also where the
     strength comes after the stress; not again in what follows from it."""
@@ -199,7 +199,7 @@ def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
     assert stresses(again) == pytest.approx(0.25 * stresses(sim), rel=1e-12)
 
 
-def test_relaxation_says_what_it_lets_flow_on_the_way(tmp_path):
+def test_relaxation_says_what_it_lets_flow_meanwhile(tmp_path):
     """A column near its strength whose modulus grows to three times: said by model solve, which goes the way where it
     flows; not before, and not where the static solve has found balance, without flow, first."""
     for at_once in (False, True):

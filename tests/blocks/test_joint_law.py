@@ -131,7 +131,7 @@ def test_unloading_follows_the_line_through_the_origin(back):
     assert sigma[3001:] == pytest.approx(at_peak * again[3001:] / there[-1], rel=1e-9, abs=1e-3)
 
 
-def test_damage_of_proportional_loading_does_not_depend_on_the_way_there():
+def test_damage_of_proportional_loading_does_not_depend_on_the_path():
     """D = sqrt(((o - o_p) / o_t)^2 + ((|s| - s_p) / s_t)^2) at the end, in one stride or in a thousand."""
     ends = np.array([1e-5, 2e-5])
     results = [pull(np.linspace(0.0, 1.0, n)[:, None] * ends)[0][-1] for n in (11, 1001)]

@@ -159,7 +159,7 @@ def test_what_is_of_another_file_is_not_kept(tmp_path, text):
          "from numba import njit\n@njit(fastmath=True)\ndef law(x):\n    return x"),
     ],
 )  # fmt: skip
-def test_values_tell_functions_apart(tmp_path, one, other):
+def test_values_distinguish_functions(tmp_path, one, other):
     assert parts(tmp_path, "import math\n" + one) != parts(tmp_path, "import math\n" + other)
 
 

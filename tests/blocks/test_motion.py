@@ -270,7 +270,7 @@ def test_pressure_follows_the_surface_and_its_table():
     assert JOINT["gf1"] > 0.0
 
 
-def test_mass_scaling_reaches_the_time_step_and_tells_the_mass():
+def test_mass_scaling_reaches_the_time_step_and_reports_the_mass():
     sim = model(rectangle(4, 4, 1.0, 1.0))
     sim.option(collision=False)
     sim.step()

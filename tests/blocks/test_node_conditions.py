@@ -191,7 +191,7 @@ def test_files_of_versions_in_which_constraints_came_first():
     assert (led.at_x, led.at_y) == pytest.approx((turn[0] ** 2, turn[0] * turn[1])) and led.constraint == nodes.UNBOUND
 
 
-def test_a_file_with_conditions_by_points_goes_on():
+def test_a_file_with_conditions_by_points_continues():
     """Of versions in which both sides of a joint had one condition: the same steps as the model that wrote it."""
 
     def made() -> Blocks:

@@ -170,7 +170,7 @@ def test_steady_flow_between_equal_pressures():
         run.steady()
 
 
-def test_what_is_no_balance_is_still_said():
+def test_what_is_no_balance_is_still_reported():
     """Coordinates so large that positions hold no strain of the loads: the message stands."""
     sim = Blocks()
     mesh = rectangle(3, 3, 1.0, 1.0, x0=1e9, y0=1e9, kind="quad")

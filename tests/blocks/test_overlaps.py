@@ -130,7 +130,7 @@ print('went')
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_script_is_told_the_line(resident, tmp_path, ranks):
+def test_a_script_is_reported_the_line(resident, tmp_path, ranks):
     for option, code in (("", 2), ("pcdc model option overlap keep", 0)):
         (tmp_path / "over.sc").write_text(SCRIPT.format(option=option))
         done = resident(ranks, "over.sc", cwd=tmp_path)
@@ -173,7 +173,7 @@ class Log:
         self.said.append(text)
 
 
-def test_a_deep_overlap_is_said_with_its_place():
+def test_a_deep_overlap_is_reported_with_its_place():
     """Twice 0.035 m of an altitude of 0.5 m: where, how deep, how many; twice 0.02 m: nothing is said."""
     assert not sinks(0.02)[1]
     sim, said = sinks(0.035)

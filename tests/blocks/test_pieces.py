@@ -55,7 +55,7 @@ def test_histories_forget_partners_and_joints() -> None:
     assert found == [(0, -2, 0.0), (0, 3, 4.0), (2, 7, 1.0), (2, 9, 3.0), (3, -1, 5.0)]
 
 
-def test_each_edge_is_told_once_also_across_the_first_face() -> None:
+def test_each_edge_is_reported_once_also_across_the_first_face() -> None:
     cells = np.array([[0, 1, 2, -1], [1, 0, 3, 4]])
     edges = connectivity.edges_of(cells, 5)
     assert edges.faces.tolist() == [[0, 4], [1, -1], [2, -1], [5, -1], [6, -1], [7, -1]]

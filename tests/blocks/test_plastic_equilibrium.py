@@ -355,7 +355,7 @@ def test_one_stage_after_the_other_and_a_file_between(tmp_path):
     assert (straight[-1] >= before).all() and straight[-1].max() > 1.5 * before.max() > 0.0
 
 
-def test_steps_that_go_on_from_there_change_nothing():
+def test_steps_that_continue_from_there_change_nothing():
     sim = stamp("mixed")
     equilibrium.solve_elastic(sim)
     before = {name: diagnostics.values(sim, name) for name in (*STRESSES, *MEMORY)}
@@ -387,7 +387,7 @@ def test_the_energy_budget_calls_it_a_command():
 
 
 @pytest.mark.parametrize("kind", ["cross", "quad"])
-def test_more_than_the_rock_can_bear(kind):
+def test_more_than_the_rock_can_carry(kind):
     """A plate between smooth plates bears 2 c sqrt(N); under 5/4 of that balance is found up to four fifths, within the
     smallest increment, and the model is as it was."""
     sim = soil(kind, tensile=1e9)

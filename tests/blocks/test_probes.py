@@ -132,7 +132,7 @@ def test_forces_of_supports_come_with_the_next_step(dynamic, tmp_path, monkeypat
     assert len(looks) <= steps // 5 + 2  # the last: what the log says
 
 
-def test_a_history_of_one_node_looks_at_one_row(tmp_path, monkeypatch):
+def test_a_history_of_one_node_reads_one_row(tmp_path, monkeypatch):
     project = supported(tmp_path)
     for name in [*project.histories]:
         histories.delete(project, name)

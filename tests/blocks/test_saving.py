@@ -29,7 +29,7 @@ def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
         assert np.array_equal(values, b[name], equal_nan=True), name
 
 
-def test_a_run_with_all_kinds_of_stages_goes_on(tmp_path):
+def test_a_run_with_all_kinds_of_stages_continues(tmp_path):
     """Before the first step, at rest, just after elements were taken out (not stepped yet), while forces fade, before
     and after the change to motion, while it breaks: 60 steps from a file come to the state of the run that wrote it."""
     sim, given, ends = Blocks(), (300, 750), {}  # given: saved with the commands of this step given, the model open

@@ -248,7 +248,7 @@ def test_a_block_on_an_incline(kind):
 
 
 @pytest.mark.parametrize("kind", ["cross", "box"])
-def test_a_run_that_goes_on_in_mid_slip(kind, tmp_path):
+def test_a_run_that_continues_in_mid_slip(kind, tmp_path):
     """The same bits, with dilation under way; and static solves go on from what a dynamic run has left."""
 
     def begin() -> Blocks:
@@ -431,7 +431,7 @@ def test_cracks_cannot_slide_by_such_a_law(model, values):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("kind", SOME)
-def test_one_side_is_taken_out_and_put_back(kind):
+def test_one_side_is_removed_and_put_back(kind):
     """The joint is gone with it, without a word of NumPy, and what comes back hangs together without it."""
     sim = stack(kind, COULOMB_JOINT.name, COULOMB, young=1e9, dynamic=True)
     convergence.advance(sim, 20)

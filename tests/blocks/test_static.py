@@ -80,7 +80,7 @@ def test_a_block_rests_on_a_slope(kind, with_joints):
     assert np.abs(diagnostics.values(sim, "displacement_x")).max() < 1e-4
 
 
-def test_rollers_on_an_oblique_line_do_not_rub():
+def test_rollers_on_an_oblique_line_do_not_resist():
     """Local damping acts on the force along the line, not on what the line carries: a body on a plane of 30 degrees
     that leans against another one comes to rest, in the state of the static solve; both carry its weight."""
     turn = math.radians(30.0)
@@ -118,7 +118,7 @@ def test_rollers_on_an_oblique_line_do_not_rub():
 
 
 @pytest.mark.slow
-def test_what_is_taken_out_lets_go_slowly():
+def test_what_is_removed_is_released_slowly():
     """With `relax` the balance is kept at first and lost bit by bit; in the end all forces are gone."""
     sim = leaning("mixed", True)
     sim.option(dynamic=False)

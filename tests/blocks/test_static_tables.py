@@ -29,7 +29,7 @@ ROCK = {"density": 2000.0, "young": 1e8, "poisson_ratio": 0.2}
     "rows, told",
     [([(0, 1), (2, 1), (1, 3)], "1 follows 2 (pair 3)"), ([(5, 1), (5, 2)], "5 follows 5 (pair 2)")],
 )
-def test_times_that_do_not_ascend_are_told_with_their_place(rows, told):
+def test_times_that_do_not_ascend_are_reported_with_their_place(rows, told):
     with pytest.raises(CommandError, match=rf"table 't': times must ascend, but {re.escape(told)}$"):
         Table.of(rows, "t")
 
@@ -142,7 +142,7 @@ def test_a_checkpoint_within_a_ramp(at, tmp_path: Path):
     assert np.array_equal(diagnostics.values(sim, "position_y"), diagnostics.values(again, "position_y"))
 
 
-def test_what_happens_at_the_ends_is_said():
+def test_what_happens_at_the_ends_is_reported():
     """Static mode ends: a table that has another value at the model time is named. One that is over within a static
     step is, too."""
     sim, said = block(), []
@@ -159,7 +159,7 @@ def test_what_happens_at_the_ends_is_said():
     assert "table 'load' of a condition goes from 0 to -100000 within one static step" in said[1]
 
 
-def test_implicit_steps_refuse_tables_of_blocks_that_go_on():
+def test_implicit_steps_refuse_tables_of_blocks_that_continue():
     """They count no static steps; a table that is at its end does nothing."""
     sim = block()
     sim.joint_model(inner(sim.the_mesh()), "classic_intrinsic_cohesive_interface", {**JOINT, "penalty_normal": 1e10})

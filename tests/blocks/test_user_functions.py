@@ -96,7 +96,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_told_by_file_and_line(case, tmp_path):
+def test_what_is_wrong_is_reported_by_file_and_line(case, tmp_path):
     text, message = WRONG[case]
     (tmp_path / "f.py").write_text(text)
     sim = plate()

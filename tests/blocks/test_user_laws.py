@@ -174,7 +174,7 @@ def test_a_quad_follows_the_law_in_each_of_its_triangles():
     assert max(slips) > 0.0 and np.ptp(slips) > 0.0
 
 
-def test_states_stand_in_frames(tmp_path):
+def test_states_are_in_frames(tmp_path):
     shutil.copy(LAWS, tmp_path)
     text = """
 pcdc mesh structured (0,0) (1,1) cells 3 3
@@ -306,7 +306,7 @@ WRONG = {
 
 
 @each("case", WRONG)
-def test_what_is_wrong_with_a_law_is_told_by_file_and_line(case, tmp_path):
+def test_what_is_wrong_with_a_law_is_reported_by_file_and_line(case, tmp_path):
     text, message = WRONG[case]
     sim = model(rectangle(2, 2, 1.0, 1.0))
     with pytest.raises(CommandError) as caught:

@@ -121,7 +121,7 @@ def test_what_creeps_hangs_on_its_bolt_more_and_more() -> None:
     creep.check(sim, 1e6)
 
 
-def test_excavated_hosts_let_go() -> None:
+def test_excavated_hosts_release_supports() -> None:
     """The rock around the head is taken out: its nodes are free of grout, the plate is gone, the rest still holds."""
     sim = block()
     sim.gravity(0.0, -9.81)
@@ -187,7 +187,7 @@ def test_the_account_of_energy_closes(steps) -> None:
 
 
 @pytest.mark.parametrize("at", [150, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 400))])
-def test_a_saved_model_goes_on(at, tmp_path) -> None:
+def test_a_saved_model_continues(at, tmp_path) -> None:
     """Before the first step, in mid-run, after rupture: with commands given just before, too."""
     sim = block(True, 5e9)
     bolts = bolt(sim, (0.5, 1.0), (0.42, 0.2), segments=20, tensile_yield_force=8e3, tension_failure_strain=0.1,
@@ -211,7 +211,7 @@ def test_a_saved_model_goes_on(at, tmp_path) -> None:
     )
 
 
-def test_mass_is_added_where_the_time_step_needs_it_and_said() -> None:
+def test_mass_is_added_where_the_time_step_needs_it_and_reported() -> None:
     from tests.pcdc.fake import Noted
 
     sim = block(True, 1e8)
@@ -274,7 +274,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
     assert Bolts.there(sim) is None
 
 
-def test_deleted_elements_carry_nothing_and_the_rest_goes_on() -> None:
+def test_deleted_elements_carry_nothing_and_the_rest_continues() -> None:
     """The middle of a tensioned bolt is taken out: each half is held by its own grout; numbers stay."""
     sim = block(young=50e9)
     sim.gravity(0.0, -9.81)

@@ -113,7 +113,7 @@ def test_equilibrium_at_once_is_refused(tmp_path):
         stepping.solve_elastic(project)
 
 
-def test_a_time_step_that_is_said_later_counts(tmp_path):
+def test_a_time_step_that_is_assigned_later_counts(tmp_path):
     """Of either side, or by SET frac; different ones for both are refused."""
     project, sim = scene(tmp_path)
     coupling.couple(project, sim)
@@ -152,7 +152,7 @@ def test_frac_is_what_the_particles_ask_for(tmp_path):
     )
 
 
-def test_what_is_said_of_one_only_is_named(tmp_path):
+def test_settings_of_one_only_are_named(tmp_path):
     """Gravity of one side, collision off, and walls of which blocks know nothing: once each."""
     project, sim = scene(tmp_path)
     said = io.StringIO()

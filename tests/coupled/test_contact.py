@@ -277,7 +277,7 @@ def test_faces_are_sent_to_the_ranks_whose_discs_they_may_meet() -> None:
     hot = np.zeros((2, WIDTH))
     hot[:, X], hot[:, Y], hot[:, RADIUS] = (2.6, 5.6), (0.6, 1.4), 0.5
     link = SimpleNamespace(
-        comm=SimpleNamespace(size=3, rank=1, max_into=most), room=0.1, _rows=np.arange(2),
+        comm=SimpleNamespace(size=3, rank=1, max_into=most), margin=0.1, _rows=np.arange(2),
         particles=SimpleNamespace(particles=SimpleNamespace(hot=hot)),
     )  # fmt: skip
     low = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [6.5, 0.5], [8.5, -3.0], [5.0, 0.5]])

@@ -77,7 +77,7 @@ def assert_alike(one: Path, other: Path) -> None:
     "before, after",
     [(1, 2), *(pytest.param(*ranks, marks=pytest.mark.slow) for ranks in ((1, 3), (3, 1), (2, 4)))],
 )
-def test_it_goes_on_on_other_ranks(resident, straight, tmp_path, before, after):
+def test_it_continues_on_other_ranks(resident, straight, tmp_path, before, after):
     folder, lines = straight
     first = stopped(resident, tmp_path / "a", before)
     assert 0 < len(first) < len(lines)

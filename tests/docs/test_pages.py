@@ -145,7 +145,7 @@ def test_commands_have_their_line_in_chinese() -> None:
     assert set(catalogue.of("pcdc default")) <= {option.default for option in shown}
 
 
-def test_a_meaning_that_nobody_wrote_in_chinese_is_told_in_english(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_meaning_that_nobody_wrote_in_chinese_is_reported_in_english(monkeypatch: pytest.MonkeyPatch) -> None:
     english = "tensile strength; 0: none"
     assert english not in chinese.pcdc_page()
     monkeypatch.setattr(chinese, "known", lambda *of: None if of[1] == english else known(*of))

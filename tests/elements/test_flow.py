@@ -121,7 +121,7 @@ def test_tension_and_the_apex(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_what_is_given_back_and_forgotten(name: str) -> None:
+def test_what_is_released_and_reset(name: str) -> None:
     """Unloaded an element is elastic, keeps the strain of its flow, and remembers that it has yielded; element reset
     state forgets what is counted, stresses stay. Another model keeps them too, and rock that is made weaker flows at
     once."""

@@ -82,7 +82,7 @@ def test_a_missing_file_is_found(pair, pattern) -> None:
     assert judge.other_end(data, reference, set()) == [f"{path.name} is missing"]
 
 
-def test_folders_below_are_looked_at(tmp_path: Path) -> None:
+def test_folders_below_are_inspected(tmp_path: Path) -> None:
     """As that of the particles of a coupled run: a changed series, a missing and a strange frame."""
     reference = Reference(tmp_path / "reference", model=MODELS["coupled"])
     for data in (reference.data, tmp_path / "data"):

@@ -172,7 +172,7 @@ def test_a_signal_to_the_launcher_reaches_the_ranks(launch, resident, script, un
 
 
 @pytest.mark.mpi
-def test_sigusr2_saves_and_goes_on(launch, script, undisturbed, wait_until, rank_process):
+def test_sigusr2_saves_and_continues(launch, script, undisturbed, wait_until, rank_process):
     data = script.parent / "data"
     script.write_text(PILE.replace(" save 400", "").replace(" save 8.0", ""))
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
@@ -305,7 +305,7 @@ def test_a_script_out_of_a_checkpoint_writes_nowhere_else(resident, script, tmp_
     assert not victim.exists()
 
 
-def test_a_moved_folder_goes_on(resident, script, undisturbed, tmp_path_factory):
+def test_a_moved_folder_continues(resident, script, undisturbed, tmp_path_factory):
     assert resident(1, script, "--time-limit", AT_ONCE, "--no-figure", cwd=script.parent).returncode == 85
     elsewhere = tmp_path_factory.mktemp("moved")
     shutil.move(script.parent / "data", elsewhere / "data")
@@ -367,7 +367,7 @@ def test_old_checkpoints_are_spared_by_the_time_of_the_model(resident, script, u
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(resident, script, undisturbed, stopped):
+def test_a_run_continues_from_the_last_checkpoint_before_a_time(resident, script, undisturbed, stopped):
     """32.4 s are step 810. Later checkpoints of the run that was given up are passed over from then on."""
     assert resident(1, script, "--before", "32.4", cwd=script.parent).stderr.count("add --resume") == 1
     none = resident(1, script, "--resume", "--before", "15.9", "--no-figure", cwd=script.parent)
@@ -391,7 +391,7 @@ def test_a_checkpoint_that_nobody_asked_for(resident, script, undisturbed):
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
-def test_info_tells_what_is_there(launch, script, stopped):
+def test_info_lists_the_contents(launch, script, stopped):
     newest = max(stopped.glob("*.sav"))
     done = launch(1, "info", newest, cwd=script.parent)
     assert done.returncode == 0 and "checkpoint, complete" in done.stdout and "CYC" in done.stdout

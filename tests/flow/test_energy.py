@@ -103,14 +103,14 @@ def test_a_checkpoint_keeps_it(tmp_path) -> None:
     assert Flow.of(again).energies() == expected
 
 
-def test_where_grains_bear_it_is_refused() -> None:
+def test_where_grains_carry_load_is_refused() -> None:
     flow = pumped(1)[1]
     flow.energy = None
     with pytest.raises(CommandError, match="does not support packs of grains"):
         flow.energies()
 
 
-def test_what_does_not_add_up_is_told() -> None:
+def test_what_does_not_add_up_is_reported() -> None:
     """Pumped and outside come, all others but what is pushed are taken; relative to the largest."""
     entries = dict(zip(ENTRIES, (100.0, 1.0, 2.0, 4.0, 64.0, 8.0, 16.0, 32.0, -20.0)))
     found = account.closed(entries)

@@ -337,7 +337,7 @@ def test_a_well_draws_no_more_than_there_is() -> None:
     assert 0.0 < -flow.well_value("w", "injected") <= 1e-4 and flow.account()["relative"] < 1e-12
 
 
-def test_nodes_of_a_well_are_one_room_in_implicit_steps() -> None:
+def test_nodes_of_a_well_share_one_volume_in_implicit_steps() -> None:
     """Upright, 2 m: half full first, then under a head; as by explicit steps (test_wells.py)."""
     sim, flow = standing(rectangle(1, 4, 0.5, 2.0, y0=0.0), fluid_bulk=1e6)
     sim.close_model()
@@ -583,7 +583,7 @@ def test_a_file_in_mid_injection(tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_injection_goes_on_where_a_part_is_dug_away(tmp_path) -> None:
+def test_injection_continues_where_a_part_is_dug_away(tmp_path) -> None:
     """A well with stages, leak-off into rock that is not saturated; elements on both sides of wet channels are taken
     out. From a checkpoint before that, the same."""
     leak = {"leak_off": 1.0, "matrix_permeability": 1e-18, "matrix_porosity": 0.2, "matrix_saturation": 0.4}
@@ -653,7 +653,7 @@ def sheared(friction: float = 30.0) -> tuple[Blocks, Flow]:
 
 
 @pytest.mark.parametrize("friction", [0.0, 20.0, 30.0])
-def test_faces_of_a_crack_rub(friction: float) -> None:
+def test_faces_of_a_crack_slide_with_friction(friction: float) -> None:
     """No more shear than friction holds, and as much where they slip; pressure of the fluid takes it away."""
     sim, flow = sheared(friction)
     limit = math.tan(math.radians(friction))

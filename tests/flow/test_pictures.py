@@ -62,15 +62,17 @@ def test_channels_are_coloured_by_what_is_in_them(tmp_path: Path) -> None:
     assert np.isfinite(joints["aperture"]).sum() == 8 and wet.sum() == 5  # one is filled by half
     for word, column, unit in (("pressure", "fluid_pressure", 1e3), ("aperture", "aperture", 1e-6),
                                ("saturation", "saturation", 1.0), ("velocity", "fluid_velocity", None)):  # fmt: skip
-        (found,) = coloured(blocks.draw(state, blocks.Looks((word,))))
+        (found,) = coloured(blocks.draw(state, blocks.Appearance((word,))))
         shown = fluid.PICTURES[word]
         expected = np.abs(joints[column][wet if not shown.dry else np.isfinite(joints["aperture"])])
         unit = blocks.unit_of(shown, shown.range(state), state)[0] if unit is None else unit
         assert np.sort(np.asarray(found)) == pytest.approx(np.sort(expected / unit)), word
-    assert len(set(np.round(coloured(blocks.draw(state, blocks.Looks(("pressure",))))[0]))) == 3  # 750, 500, 250 kPa
+    assert (
+        len(set(np.round(coloured(blocks.draw(state, blocks.Appearance(("pressure",))))[0]))) == 3
+    )  # 750, 500, 250 kPa
     dry = frames.whole(_without(tmp_path))
     assert not fluid.there(dry) and blocks.panels_of(dry) == ("cracks", "stress")
-    assert not coloured(blocks.draw(dry, blocks.Looks(("pressure",))))
+    assert not coloured(blocks.draw(dry, blocks.Appearance(("pressure",))))
 
 
 def _without(tmp_path: Path) -> fdem.Project:
@@ -85,7 +87,7 @@ def test_wide_channels_are_wide_lines(tmp_path: Path) -> None:
     state = frames.whole(model)
     rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
     state.of_joints["aperture"][rows[:4]] = 2e-4
-    figure = blocks.draw(state, blocks.Looks(("aperture",)))
+    figure = blocks.draw(state, blocks.Appearance(("aperture",)))
     (lines,) = [c for c in figure.axes[0].collections if c.get_array() is not None]
     wide = np.asarray(lines.get_linewidths())[np.argsort(lines.get_array(), kind="stable")]
     assert wide[-1] == pytest.approx(2.0 * wide[0]) and len(wide) == 8
@@ -185,8 +187,8 @@ def test_a_film_has_one_range_of_pressure(tmp_path: Path) -> None:
     from hpcdem.cli.movie import PANELS_SHOWN
 
     state = frames.whole(strip(tmp_path))
-    looks = blocks.Looks(("pressure",), ranges={"pressure": (0.0, 3e6)})
-    figure = blocks.draw(state, looks, View(0.0, 8.0, 0.0, 2.0))
+    appearance = blocks.Appearance(("pressure",), ranges={"pressure": (0.0, 3e6)})
+    figure = blocks.draw(state, appearance, View(0.0, 8.0, 0.0, 2.0))
     (lines,) = [c for c in figure.axes[0].collections if c.get_array() is not None]
     assert lines.norm.vmax == pytest.approx(3.0)
     assert set(fluid.PICTURES) <= set(PANELS_SHOWN)

@@ -434,7 +434,7 @@ def test_fluid_that_is_pumped_into_a_joint_opens_it() -> None:
     assert flow.account()["relative"] < 1e-12
 
 
-def test_implicit_steps_go_on_from_a_file(tmp_path) -> None:
+def test_implicit_steps_continue_from_a_file(tmp_path) -> None:
     """In the middle of what is pumped into the joint, which opens: the same bits; and not beside blocks in motion."""
 
     def on(one: Blocks, end: float) -> None:
@@ -508,7 +508,7 @@ def test_faces_of_a_crack_press_on_each_other(made: Callable[..., Mesh]) -> None
 
 
 @pytest.mark.parametrize(("friction", "made"), [(0.0, box), (30.0, box), (30.0, hexes)])
-def test_faces_of_a_crack_rub(friction: float, made: Callable[..., Mesh]) -> None:
+def test_faces_of_a_crack_slide_with_friction(friction: float, made: Callable[..., Mesh]) -> None:
     """No more shear than friction holds, and as much where they slip; pressure of the fluid takes it away."""
     sim, flow, middle = _cracked(made, zz=-1e6, xz=8e5)
     sim.joint_property(flow.network.channels, {"friction": friction})

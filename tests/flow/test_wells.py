@@ -132,7 +132,7 @@ def test_a_well_cannot_draw_what_is_not_there() -> None:
     assert flow.account()["relative"] < 1e-12
 
 
-def test_nodes_of_a_well_are_one_room() -> None:
+def test_nodes_of_a_well_share_one_volume() -> None:
     """Four corners of a square hole, two channels at each, of which some are dry: one pressure, and it is that of all
     the fluid in their room."""
     sim, flow = standing(rectangle(2, 2, 1.0, 1.0), fluid_bulk=1e6)

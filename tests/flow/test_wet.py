@@ -254,7 +254,7 @@ def test_wet_faces_are_kept_by_files(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(9))
-def test_whatever_is_said_in_whatever_order(seed: int) -> None:
+def test_assignments_in_any_order(seed: int) -> None:
     """Random meshes, channels, cracks, pits, ranges, wells and stresses, beside a plain loop over all faces: wet are
     free ones, no sides of channels, without a stress, all of whose points a statement names that still holds."""
     rng = np.random.default_rng(seed)
@@ -345,7 +345,7 @@ def test_a_script_asks_and_frames_show(tmp_path) -> None:
 # ---- fluid that is kept as it is -------------------------------------------------------------------------------------
 
 
-def test_fluid_that_is_switched_off_goes_on_pushing() -> None:
+def test_fluid_that_is_switched_off_continues_pushing() -> None:
     """Blocks come to rest at the pressures of that moment, stepped or at once, however stiff the fluid; it goes on with
     them, and no step shows that it was off."""
     found = {}

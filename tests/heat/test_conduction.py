@@ -217,7 +217,7 @@ def at_points(sim: Blocks, x: float) -> np.ndarray:
     return ((cells >= 0) & (np.abs(sim.mesh.points[cells][:, :, 0] - x) < 1e-9)).reshape(-1)
 
 
-def test_what_is_taken_out_takes_its_heat() -> None:
+def test_what_is_removed_takes_its_heat() -> None:
     mesh = rectangle(8, 2, 2.0, 0.5)
     sim, heat = standing(mesh)
     heat.initial(None, 20.0)
@@ -261,7 +261,7 @@ def test_the_time_step_is_that_of_the_smallest_element() -> None:
             sim.step()
 
 
-def test_a_cycle_takes_the_sub_steps_that_are_said() -> None:
+def test_a_cycle_takes_the_assigned_sub_steps() -> None:
     """Beside motion a cycle lasts as long as the steps that blocks moved."""
     mesh = rectangle(4, 2, 1.0, 0.5)
     times = {}
@@ -283,7 +283,7 @@ def test_a_cycle_takes_the_sub_steps_that_are_said() -> None:
     assert heat.time == 42.0
 
 
-def test_heat_goes_on_after_a_checkpoint(tmp_path) -> None:
+def test_heat_continues_after_a_checkpoint(tmp_path) -> None:
     """Bit by bit, with all that was said."""
     mesh = shaken(rectangle(6, 4, 1.2, 0.8, kind="mixed"), 0.2)
     sim, heat = standing(mesh, transfer_coeficient=9.0)

@@ -416,7 +416,7 @@ def test_a_script_says_it_too(tmp_path) -> None:
     assert joints["fluid_temperature"][at] == pytest.approx(t) and t.min() < 60.0
 
 
-def test_obtuse_triangles_that_conduct_are_told() -> None:
+def test_obtuse_triangles_that_conduct_are_reported() -> None:
     """Once, and not without conduction; right angles do nothing."""
     for uneven, conductivity, some in ((0.0, 0.6, False), (0.45, 0.6, True), (0.45, 0.0, False)):
         sim, _, _, fluid, _ = fracture((6, 3), (0.6, 0.3), 0.01, {"conductivity": conductivity}, uneven)

@@ -55,7 +55,7 @@ def test_steps_after_restore():
     assert expected_steps(statements, dt=0.05, walls={1: (2.0, 0.0)}) == 1005
 
 
-def test_a_replaced_wall_stands_still():
+def test_a_replaced_wall_is_at_rest():
     from hpcdem.core.errors import ScriptError
 
     with pytest.raises(ScriptError, match="wall 1 does not move"):
@@ -173,7 +173,7 @@ def test_particles_of_files(tmp_path):
     assert examined("LOAD a.dat", file=str(tmp_path / "s.py")).particles is None
 
 
-def test_a_restart_file_is_looked_into(tmp_path):
+def test_a_restart_file_is_inspected(tmp_path):
     from hpcdem.lang.zdem.execute import Interpreter
     from hpcdem.physics.dem.simulation import Simulation
 
@@ -204,7 +204,7 @@ def test_output_files():
     assert report.outputs["print"].size == 0, "no particles"
 
 
-def test_outputs_after_restore_are_known_as_far_as_the_script_tells():
+def test_outputs_after_restore_are_known_as_far_as_the_script_defines_them():
     report = examined("RES 0000000090.sav", "SET print 100", "CYC 20")
     assert report.runs[0].start == 90
     assert report.outputs["print"].files == 2
@@ -213,7 +213,7 @@ def test_outputs_after_restore_are_known_as_far_as_the_script_tells():
 
 
 @pytest.mark.parametrize(("steps", "number"), [(20, "about 1"), (200, "3")])
-def test_a_number_of_frames_that_depends_on_an_unknown_step_is_told_as_such(capsys, steps, number):
+def test_a_number_of_frames_that_depends_on_an_unknown_step_is_reported_as_such(capsys, steps, number):
     report = examined("RES settled.sav", "SET print 100", f"CYC {steps}")
     assert report.runs[0].start is None and report.outputs["print"].rough == number.startswith("about")
     print_report(report)
@@ -309,7 +309,7 @@ def test_output_files_are_listed():
     assert ".ps" not in text
 
 
-def test_files_that_could_not_be_written_are_told(tmp_path):
+def test_files_that_could_not_be_written_are_reported(tmp_path):
     report = examined("START", "SAV results/a.sav", file=str(tmp_path / "s.py"))
     assert any("line 2: SAV: folder" in note for note in report.notes)
 

@@ -195,7 +195,7 @@ def test_errors_of_expressions_leave_with_file_and_line():
 
 @pytest.mark.parametrize("folder", ["", "data"])
 @pytest.mark.parametrize(("line", "command"), [("RES 1.sav", "checkpoints.restore"), ("LOAD 1.sav", "particles.load")])
-def test_files_are_looked_for_beside_the_script_then_in_data(tmp_path, folder, line, command):
+def test_files_are_searched_beside_the_script_then_in_data(tmp_path, folder, line, command):
     place = tmp_path / folder
     place.mkdir(exist_ok=True)
     (place / "1.sav").touch()
@@ -217,7 +217,7 @@ def test_a_file_that_is_not_there(tmp_path):
     assert caught.value.message == f"RESTORE: there is no file {tmp_path}/1.sav, nor {tmp_path}/data/1.sav"
 
 
-def test_rank_0_looks_for_files(tmp_path):
+def test_rank_0_searches_for_files(tmp_path):
     class Comm:
         rank = 1
         answers = iter([None, "/from/rank/0"])  # no folder is missing; where the file is

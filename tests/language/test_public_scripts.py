@@ -49,7 +49,7 @@ def test_histories_have_the_layout_of_public_readers_and_a_table_with_the_time(p
     np.testing.assert_allclose(table, [[k, k * 1e-3, k] for k in (10, 20, 30, 40)], rtol=1e-12)
 
 
-def test_a_run_that_goes_on_continues_its_histories(play, tmp_path):
+def test_a_run_that_continues_continues_its_histories(play, tmp_path):
     """The closing line of the run before is no obstacle."""
     play(
         "BALL id 0 x 0 y 0 rad 1", "PROP density 2 xv 3", "HIST id 7 interval 10 step", "CYC 20", "SAV a.sav", "CYC 20"
@@ -130,7 +130,7 @@ def test_pressure_pushes_freed_particles(play, disk, mass, thickness):
     assert "warning: xp, yp: the force on each particle is pressure 2 R thickness" in log
 
 
-def test_pressure_stands_in_frames_and_ends_when_it_is_taken_back(play, tmp_path):
+def test_pressure_is_in_frames_and_ends_when_it_is_taken_back(play, tmp_path):
     lines = ["SET print 2", "BALL id 0 x 0 y 0 rad 0.5", "BALL id 1 x 9 y 0 rad 0.5", "PROP density 2.0"]
     sim, _ = play(*lines, "PROP xp 100.0 RANGE id 1", "CYC 2", "PROP xp 0.0", "CYC 2")
     p = read_dat(tmp_path / "data/all_0000000002.dat").tables["particles"].columns
@@ -438,7 +438,7 @@ def test_grains_without_density_or_law_are_refused_before_the_first_step(play, t
     assert not (tmp_path / "data").exists()
 
 
-def test_fixed_particles_without_a_law_are_told(play):
+def test_fixed_particles_without_a_law_are_reported(play):
     """They may be out of reach of all others."""
     lines = [SAND, "PROP density 1 shear 1e9 poiss 0.2 hertz", "BALL id 99 x 50 y 50 rad 1 group b"]
     _, log = play(*lines, "FIX x y spin range group b", "CYC 5", "CYC 5")
@@ -468,7 +468,7 @@ def test_lines_that_a_pdf_broke(lines, message):
         parse_text("\n".join(["START", *lines]) + "\n", "a.py")
 
 
-def test_two_bounds_that_may_be_an_expression_with_a_blank_are_told(play):
+def test_two_bounds_that_may_be_an_expression_with_a_blank_are_reported(play):
     _, log = play("BALL id 0 x 0 y 0 rad 1", "PROP color red RANGE y {top} -1000.0")
     assert "'{top}' and '-1000.0' are interpreted as two bounds of y; blanks are not allowed" in log
     _, log = play(
@@ -477,7 +477,7 @@ def test_two_bounds_that_may_be_an_expression_with_a_blank_are_told(play):
     assert "warning" not in log
 
 
-def test_the_log_of_a_run_that_goes_on_counts_from_the_beginning_of_the_command(play, tmp_path):
+def test_the_log_of_a_run_that_continues_counts_from_the_beginning_of_the_command(play, tmp_path):
     text = (
         "START\nSET dt 1e-3 stepbar 25\nBALL id 0 x 0 y 0 rad 1\nPROP density 1\nWALL id 1 nodes (9 9) (9 8) xv 1.0\n"
     )

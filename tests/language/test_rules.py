@@ -189,7 +189,7 @@ def test_extents_are_those_of_particles_that_can_move(play):
     assert value(model(play, *ROW, "FIX x y", "FREE y RANGE id 5", "PROP color red RANGE x {left} {right}"), "color", 5)
 
 
-def test_a_group_that_is_not_there_is_told(play):
+def test_a_group_that_is_not_there_is_reported(play):
     _, log = play(*ROW, "PROP color red RANGE group sedd")
     assert "warning: no particle has ever been in group sedd" in log
 
@@ -481,7 +481,7 @@ def test_both_sides_have_the_properties_of_the_wall(play):
         assert contact.fn == pytest.approx(2e5) and abs(contact.fs) == pytest.approx(0.2 * 2e5), "the smaller friction"
 
 
-def test_a_wall_moves_until_it_is_told_otherwise(play):
+def test_a_wall_moves_until_it_is_reported_otherwise(play):
     wall = "WALL id 1, nodes ( 2.0 40.0 ) ( 2.0 2.0 ), kn=4.4e3 ks=4.14e3 fric=0.55 color=red"
     sim = model(play, wall, "WALL id 1 xv 2.0 yv -1", "CYC 100", "WALL id 1 xv 0.0", "CYC 100")
     k = sim.walls.row(1)
@@ -509,7 +509,7 @@ def test_box_keeps_in_and_deletes_who_gets_out(play):
 # ---- running and output --------------------------------------------------------------------------------------------
 
 
-def test_imple_goes_the_way_and_counts_its_outputs_from_its_start(play, tmp_path):
+def test_imple_reaches_the_displacement_and_counts_its_outputs_from_its_start(play, tmp_path):
     wall = ["WALL id 1 nodes (0 0) (0 9) xv 2.0", "BALL id 0 x 50 y 0 rad 1", "PROP density 1"]
     sim = model(
         play, *wall, "SET print 30 save 40", "CYC 70", "IMPLE wall id 1 xmove 0.2 print 0.08 ps 0.1 vtk 0.05 save 0.15"
@@ -521,7 +521,7 @@ def test_imple_goes_the_way_and_counts_its_outputs_from_its_start(play, tmp_path
     assert sorted(int(p.stem) for p in data.glob("*.sav")) == [40, 145]
 
 
-def test_ymove_and_the_sense_of_the_way(play):
+def test_ymove_and_the_sense_of_the_displacement(play):
     """The distance is what counts; that the wall goes the other way is told."""
     wall = ["WALL id 1 nodes (0 0) (9 0) yv -0.5", "BALL id 0 x 50 y 9 rad 1", "PROP density 1"]
     sim, log = play(*wall, "IMPLE wall id 1 ymove 0.05")

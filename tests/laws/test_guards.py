@@ -54,7 +54,7 @@ def test_one_line_names_the_deepest_and_counts_all(tmp_path):
     assert len(lines) == 1 and "13 contacts overlap" in lines[0] and "particles 24 and 25" in lines[0]
 
 
-def test_nothing_is_said_of_usual_overlaps(tmp_path):
+def test_nothing_is_reported_of_usual_overlaps(tmp_path):
     sim, said = crowd(tmp_path, [0.01, 0.49])
     cycles.cycle(sim, 20)
     assert "overlap" not in said.getvalue()
@@ -78,7 +78,7 @@ def test_who_left_the_box(tmp_path):
 
 
 @pytest.mark.parametrize("speed", [400.0, 600.0])
-def test_who_runs_away_through_the_box_between_two_looks_stops_the_run(tmp_path, speed):
+def test_who_runs_away_through_the_box_between_two_checks_stops_the_run(tmp_path, speed):
     """Five steps of 0.4 and of 0.6 of the radius, then a command opens the model."""
     sim, said = crowd(tmp_path, [], dt=1e-3)
     walls.box(sim, -10.0, 10.0, -5.0, 100.0)
@@ -129,7 +129,7 @@ def meeting(folder, monkeypatch, glance: int, speed: float, walled: bool = False
     return sim
 
 
-def test_who_speeds_up_between_two_looks_is_seen(tmp_path, monkeypatch):
+def test_who_speeds_up_between_two_checks_is_seen(tmp_path, monkeypatch):
     """The lists are there before the contact is, as somebody glances every few steps; nothing is late."""
     for walled in (False, True):
         sim = meeting(tmp_path, monkeypatch, rebuild.GLANCE, 25.0, walled)

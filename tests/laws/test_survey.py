@@ -119,7 +119,7 @@ def test_who_crosses_a_wall_that_is_not_steep() -> None:
 
 
 @pytest.mark.parametrize("broken", [(0, np.inf), (2, np.inf), (3, np.nan)])
-def test_a_fast_disc_that_is_not_finite_is_told(broken: tuple[int, float]) -> None:
+def test_a_fast_disc_that_is_not_finite_is_reported(broken: tuple[int, float]) -> None:
     """Its place or its speed alone is enough."""
     hot, out = np.zeros((1, 8)), np.zeros(4)
     hot[0, 2:5] = 1.0

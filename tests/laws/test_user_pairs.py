@@ -186,7 +186,7 @@ def test_the_account_of_the_linear_law_is_that_of_the_built_in_one(tmp_path):
         properties.prop(sim, damp=0.0)
         settings.set_option(sim, "energy", 50)
         cycles.cycle(sim, 300)
-        found.append(sim.energy.look(sim))
+        found.append(sim.energy.evaluate(sim))
     plain, own = found
     for name in ("kinetic_translation", "elastic_normal", "elastic_shear"):
         assert getattr(own, name) == pytest.approx(getattr(plain, name), rel=1e-12), name
@@ -207,9 +207,9 @@ def test_the_account_of_a_law_that_unloads_along_another_line(tmp_path):
     sim.particles["vx"][:] = np.where(sim.particles["gid"] == 0, 1.0, -1.0)
     settings.set_option(sim, "energy", 100)
     cycles.cycle(sim, 50)
-    before = sim.energy.look(sim).kinetic_translation
+    before = sim.energy.evaluate(sim).kinetic_translation
     cycles.cycle(sim, 10000)
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert seen.elastic_normal == 0.0 and seen.kinetic_translation == pytest.approx(before / 4.0, rel=1e-3)
     assert seen.loss_laws == pytest.approx(0.75 * before, rel=1e-3)
     assert abs(seen.closing) < 1e-3 * before
@@ -302,7 +302,7 @@ def test_the_time_step_follows_its_stiffness(tmp_path):
         ("@pair_law(energy=1.0)\ndef soft(u, fs):\n    return u, fs\n", "law.py:3: energy must be a function, got 1.0"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_file_is_told_with_its_line(tmp_path, text, said):
+def test_what_is_wrong_with_a_file_is_reported_with_its_line(tmp_path, text, said):
     (tmp_path / "law.py").write_text("from hpcdem import PairProperty, Property, element_law, pair_law\n\n" + text)
     sim = support.model(tmp_path, dt=1e-4, disk="off")
     with pytest.raises(CommandError, match=said):
@@ -330,7 +330,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         bonds.bond(sim, n_bond=1.0, s_bond=1.0)
 
 
-def test_energy_is_refused_by_name_where_a_law_does_not_tell_it(tmp_path):
+def test_energy_is_refused_by_name_where_a_law_does_not_define_it(tmp_path):
     sim = two(tmp_path, law=LINEAR)
     settings.set_option(sim, "energy", 10)
     history.hist(sim, 1, 10, "energy")

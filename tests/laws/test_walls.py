@@ -162,7 +162,7 @@ def dragged(folder, *segments, x: float = -0.02, far: float = 0.04, n: int = 400
 
 @pytest.mark.parametrize("which", [k for k in JOINED if "inside" not in k])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_friction_goes_on_from_wall_to_wall(tmp_path, which, way):
+def test_friction_continues_from_wall_to_wall(tmp_path, which, way):
     """The shear force that has built up on one piece of a floor is that of the next one."""
     one, whole = dragged(tmp_path / "one", ((-5.0, 0.0), (5.0, 0.0)), x=-0.02 * way, far=0.04 * way)
     two, pieces = dragged(tmp_path / "two", *JOINED[which], x=-0.02 * way, far=0.04 * way)
@@ -172,7 +172,7 @@ def test_friction_goes_on_from_wall_to_wall(tmp_path, which, way):
 
 
 @pytest.mark.parametrize("turn", [-20.0, -0.5, 0.5, 3.0])
-def test_friction_goes_on_round_a_bend(tmp_path, turn):
+def test_friction_continues_round_a_bend(tmp_path, turn):
     """Pieces at a small angle, as of a circle: the ball goes on at a constant distance, round the end or into the
     corner; the shear force never falls below what it was when it came to the bend, until the ball slides."""
     a = math.radians(turn)
@@ -193,7 +193,7 @@ def test_the_energy_account_follows_shear_forces_from_wall_to_wall(tmp_path):
     """Nothing is booked where a ball comes to the next piece: work of the motion is stored, then lost by friction."""
     sim, _ = dragged(tmp_path, *JOINED["ends meet"], energy=10**6)
     one, _ = dragged(tmp_path / "one", ((-5.0, 0.0), (5.0, 0.0)), energy=10**6)
-    pieces, whole = sim.energy.look(sim), one.energy.look(one)
+    pieces, whole = sim.energy.evaluate(sim), one.energy.evaluate(one)
     assert pieces.loss_friction == pytest.approx(whole.loss_friction, rel=1e-9) and pieces.loss_friction > 0.0
     assert pieces.elastic_shear == pytest.approx(whole.elastic_shear, rel=1e-9)
     assert abs(pieces.loss_opened) + abs(pieces.loss_stiffness) < 1e-9 * whole.loss_friction

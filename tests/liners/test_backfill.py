@@ -82,7 +82,7 @@ def test_support_takes_what_comes_after_it_and_fill_what_comes_after_that() -> N
     assert more[0][0] < 0.8 * more[1][0] and more[0][1] < more[1][1]
 
 
-def test_the_ring_can_be_taken_out_before_the_fill() -> None:
+def test_the_ring_can_be_removed_before_the_fill() -> None:
     """Without it the drift closes further, as much as one that never had it, but for the bolts."""
     sim, _ = drift()
     bare, _ = drift(False)

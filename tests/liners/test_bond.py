@@ -130,7 +130,7 @@ def test_rock_and_liner_together_are_as_stiff_as_both() -> None:
     assert shell == pytest.approx(2.0 * 20e9 / 0.96 * 0.1 * strain, rel=0.001)
 
 
-def test_excavated_hosts_let_go_and_deleted_elements_too() -> None:
+def test_excavated_hosts_release_supports_and_deleted_elements_too() -> None:
     sim, liners = slab(young=1e9)
     drawn(sim, liners, 50, at_y=-1e-6)
     liners.remove_conditions(np.arange(len(liners)))
@@ -192,7 +192,7 @@ def test_the_account_of_energy_closes() -> None:
 
 
 @pytest.mark.parametrize("at", [150, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 400))])
-def test_a_saved_model_goes_on(at, tmp_path) -> None:
+def test_a_saved_model_continues(at, tmp_path) -> None:
     sim, liners = slab(True, 5e9, tensile_strength=0.3e6, compressive_strength=1e6, bond_tensile_strength=1e5)
     sim.table("pull", [(0.0, 0.0), (1e-3, 0.5)])
     liners.condition(np.array([0]), does_y=VELOCITY, at_y="pull")
@@ -218,7 +218,7 @@ def test_a_model_may_step_before_its_liner_has_elements() -> None:
     assert sim.clock.step == 2 and len(liners) == 0
 
 
-def test_mass_is_added_where_the_time_step_needs_it_and_said() -> None:
+def test_mass_is_added_where_the_time_step_needs_it_and_reported() -> None:
     from tests.pcdc.fake import Noted
 
     sim, liners = slab(True, 1e8)

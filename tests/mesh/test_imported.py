@@ -422,7 +422,7 @@ BAD_DECKS = {
 
 
 @pytest.mark.parametrize("name", BAD_DECKS)
-def test_what_a_deck_lacks_is_said_with_its_line(read, name):
+def test_what_a_deck_lacks_is_reported_with_its_line(read, name):
     text, said = BAD_DECKS[name]
     with pytest.raises(HpcdemError, match=said):
         read(STRIP + text, "m.inp")
@@ -544,7 +544,7 @@ def test_all_of_gmsh_is_read_by_its_numbers(gmsh, tmp_path):
         assert any("between the corners" in note for note in found.notes) == (k > 8)
 
 
-def test_numbers_of_the_file_are_told(read):
+def test_numbers_of_the_file_are_reported(read):
     """Points 11, 12, ... of a file whose elements begin at 501; inverted hexahedra are turned, folded ones refused."""
     nodes = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n" + "".join(

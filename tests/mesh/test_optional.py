@@ -18,7 +18,7 @@ from hpcdem.pre.mesh.triangulate import MeshSettings, Region, triangulate
 
 
 @pytest.mark.parametrize("name", ["shapely", "gmsh", "meshio", "ezdxf"])
-def test_a_missing_package_is_named_with_the_way_to_get_it(monkeypatch, name):
+def test_a_missing_package_is_named_with_the_command_that_installs_it(monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)  # what Python itself does to forbid an import
     with pytest.raises(HpcdemError, match=rf"needs the package {name}, which .* -m pip install -e '.*\[mesh\]'"):
         getattr(optional, name)()
@@ -77,7 +77,7 @@ def test_a_script_is_refused_at_its_first_line_that_needs_a_missing_package(monk
                 check.packages(script)
 
 
-def test_all_that_is_missing_is_said_at_once_and_by_check(monkeypatch):
+def test_all_that_is_missing_is_reported_at_once_and_by_check(monkeypatch):
     for name in ("gmsh", "shapely", "ezdxf"):
         monkeypatch.setitem(sys.modules, name, None)
     text = "pcdc geometry import 'a.dxf' as-layer 'a'\n" + "pcdc mesh create from-layer 'a' size 1\n" * 2

@@ -67,7 +67,7 @@ def test_a_mesh_fills_it_and_its_faces_lie_on_it(given: tuple, volume: float, er
 
 
 @pytest.mark.parametrize("given", [one for one, _, _ in BODIES], ids=NAMES)
-def test_distances_do_not_grow_faster_than_the_way(given: tuple) -> None:
+def test_distances_do_not_grow_faster_than_the_distance(given: tuple) -> None:
     """|d(a) - d(b)| <= |a - b|, and the sign changes at the surface only."""
     body = made(*given)
     low, high = body.bounds()

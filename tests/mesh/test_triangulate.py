@@ -377,7 +377,7 @@ def test_scale_does_not_matter():
         assert len(other.cells) == pytest.approx(len(metres.cells), rel=0.02)
 
 
-def test_slivers_of_the_outline_are_told():
+def test_slivers_of_the_outline_are_reported():
     made = meshed(
         {"o": BOX, "p": geometry.polygon([(0, 3), (10, 3), (10, 3.02)])}, [Region("o", "a"), Region("p", "b")]
     )

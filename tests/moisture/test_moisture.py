@@ -206,7 +206,7 @@ def test_a_column_is_the_stronger_the_drier_it_is(loss: float) -> None:
     assert diagnostics.values(sim, "stress_yy") == pytest.approx(-2.0 * cohesion, rel=1e-6)
 
 
-def test_it_goes_on_from_a_checkpoint(tmp_path) -> None:
+def test_it_continues_from_a_checkpoint(tmp_path) -> None:
     """With its conditions, clock and tables: the same bits."""
     sims = []
     for cut in (False, True):

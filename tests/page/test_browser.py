@@ -298,7 +298,7 @@ def test_all_grains_of_a_loose_column_can_be_shown(open_page):
     page.until(lambda: MARGIN - 2 <= np.flatnonzero((page.pixels()[..., 3] > 0).any(1))[0] < MARGIN + 40)
 
 
-def test_a_grain_tells_its_size(open_page):
+def test_a_grain_shows_its_size(open_page):
     page = open_page()
     pixels = page.pixels()
     rgb = [int(class_colours(5)[0][k : k + 2], 16) for k in (1, 3, 5)]
@@ -529,7 +529,7 @@ def test_the_dialog_closes_by_key_and_button_and_gives_the_focus_back(open_page)
 # -- the end, and time --------------------------------------------------------------------------------------------
 
 
-def test_a_server_that_has_ended_is_told(open_page, serve_page, grading_file):
+def test_a_server_that_has_ended_is_reported(open_page, serve_page, grading_file):
     served = serve_page(grading_file)
     page = open_page(url=served.url)
     picture = page.pixels()

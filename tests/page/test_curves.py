@@ -73,7 +73,7 @@ def test_an_earlier_name_of_a_history_is_the_present_one(tmp_path: Path):
         ("time", [], "1 to 12 curves"), ("time", "a", "a list of y"), (3, ["a"], "an x"),
     ],
 )  # fmt: skip
-def test_what_is_no_chart_is_told(tmp_path: Path, x: Any, y: Any, said: str):
+def test_what_is_no_chart_is_reported(tmp_path: Path, x: Any, y: Any, said: str):
     pressed(tmp_path)
     with pytest.raises(HpcdemError, match=re.escape(said)):
         Curves(tmp_path).drawn(x, y)

@@ -279,7 +279,7 @@ def test_a_script_is_renamed(desk: Desk, tmp_path: Path):
         ("a = 1\nb = 2", "pcdc", True), ("BALL id 1", "zdem", True),
     ],
 )  # fmt: skip
-def test_what_goes_on_in_another_line(text: str, language: str, ends: bool):
+def test_what_continues_in_another_line(text: str, language: str, ends: bool):
     assert whole(text, language) == ends
 
 

@@ -131,7 +131,7 @@ def test_without_the_key_nothing_is_read_or_computed():
     assert seen == []
 
 
-def test_more_requests_with_the_key_than_can_be_are_told_so(monkeypatch):
+def test_more_requests_with_the_key_than_can_be_are_reported_so(monkeypatch):
     monkeypatch.setattr(module, "CONVERSATIONS", 2)
     with served({"echo": as_json}) as page:
         slow = [connected(page, f"GET /{page.key}/ HTTP/1.0\r\n".encode()) for _ in range(2)]

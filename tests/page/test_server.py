@@ -136,7 +136,7 @@ def test_what_the_user_can_change_comes_as_a_sentence(server):
     assert status == 422 and json.loads(body) == {"error": "table:2: not like this"}
 
 
-def test_an_error_of_ours_is_told_and_the_server_goes_on(server):
+def test_an_error_of_ours_is_reported_and_the_server_continues(server):
     status, _, body = ask(server, "POST", f"/{server.key}/broken", b"{}")
     assert status == 500 and "KeyError" in json.loads(body)["error"]
     assert ask(server, "POST", f"/{server.key}/echo", b"{}")[0] == 200

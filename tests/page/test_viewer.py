@@ -97,7 +97,7 @@ def test_moving_and_zooming(page: Tab):
     assert same(before, page.after(lambda: page.tab.keyboard.press("0")))
 
 
-def test_a_query_tells_the_element_and_its_values(page: Tab, folder: Path):
+def test_a_query_shows_the_element_and_its_values(page: Tab, folder: Path):
     """Element 9 has the stress -10 MPa; its place on the page follows from the camera."""
     page.tab.keyboard.press("q")
     box = page.tab.locator("#windows canvas").first.bounding_box()
@@ -181,7 +181,7 @@ def test_objects_are_added_named_ordered_and_deleted(page: Tab):
 
 
 @pytest.mark.parametrize("text", ["__import__('os').system('x') > 1"])
-def test_a_wrong_filter_is_told_and_nothing_else_happens(browser: Any, viewing: Viewing, text: str):
+def test_a_wrong_filter_is_reported_and_nothing_else_happens(browser: Any, viewing: Viewing, text: str):
     page = Tab(browser, viewing.url, locale="en-GB")
     page.tab.click("li[data-layer=elements]")
     before = page.pixels()
@@ -212,7 +212,7 @@ def test_windows_are_linked(page: Tab):
     assert page.tab.locator(".window").count() == 1
 
 
-def test_time_goes_on(page: Tab):
+def test_time_continues(page: Tab):
     """Slider, keys and play; the history has a cursor at the present time."""
     last = page.pixels()
     first = page.after(lambda: page.tab.click("#first"))
@@ -463,7 +463,7 @@ def test_an_empty_stage_says_why(browser: Any, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(run_folder, "running", lambda folder: {"pid": 1})
     assert sources.waiting()["kind"] == "first"
     frames.write_blocks(data)
-    sources.look()
+    sources.refresh()
     assert sources.found
 
     empty = Viewing("--run", "--", tmp_path / "none")
@@ -594,7 +594,7 @@ def test_every_pixel_picks_what_is_there(viewing: Viewing, folder: Path):
         assert found["number"] == number or number < 9
 
 
-def test_fields_that_take_long_are_told_once_they_were_chosen(tmp_path: Path):
+def test_fields_that_take_long_are_reported_once_they_were_chosen(tmp_path: Path):
     """The stress of particles is made from all contacts: a click shows it after it was the colour."""
     frames.write_discs(tmp_path)
     viewing = Viewing(tmp_path)
@@ -637,7 +637,7 @@ def test_a_run_that_has_begun_shows_what_happens_as_soon_as_something_does(brows
         viewing.close()
 
 
-def test_the_range_of_colours_is_said_in_the_unit_of_the_bar(page: Tab):
+def test_the_range_of_colours_is_reported_in_the_unit_of_the_bar(page: Tab):
     page.tab.click("li[data-layer=elements]")
     page.after(lambda: page.tab.select_option("#field", "stress_yy"))
     page.until(lambda: page.text("#range-unit") == "MPa")

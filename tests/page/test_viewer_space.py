@@ -109,7 +109,7 @@ def test_a_distance_in_space(page: Tab, folder: Path):
     page.tab.wait_for_function("() => document.querySelector('#message').textContent.includes('plane')")
 
 
-def test_a_query_tells_the_element_behind_the_pixel(page: Tab, folder: Path):
+def test_a_query_shows_the_element_behind_the_pixel(page: Tab, folder: Path):
     """Cut at y = 1.6 and seen from the front, the place (x, z) of the plane is under the mouse."""
     look_from(page, "-y")
     page.after(lambda: enter(page, "#section", "y=1.6"))

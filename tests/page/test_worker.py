@@ -107,7 +107,7 @@ def test_work_that_takes_too_long_is_ended_with_advice(workers, wanted):
     assert worker.ask("specimen", wanted(**QUICK))
 
 
-def test_a_process_that_dies_is_told_and_replaced(workers, wanted):
+def test_a_process_that_dies_is_reported_and_replaced(workers, wanted):
     worker = workers(newest_wins=True)
     worker.ask("specimen", wanted(**QUICK))
     slow = Asking(worker, wanted(**SLOW))

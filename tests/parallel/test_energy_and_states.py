@@ -51,7 +51,7 @@ def one(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> tuple[P
     return folder, log
 
 
-def test_the_log_tells(one: tuple[Path, str]) -> None:
+def test_the_log_reports(one: tuple[Path, str]) -> None:
     folder, log = one
     assert [int(line.split()[1].rstrip(":")) for line in states(log)] == list(range(20, 261, 20))
     assert len(set(states(log))) == len(states(log))

@@ -82,7 +82,7 @@ def test_fluid_opens_the_joint(runs):
 
 @pytest.mark.parametrize("kind", ["pumped", "propped"])
 @SLOW
-def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs, kind):
+def test_a_file_in_mid_injection_continues_with_the_same_bits(runs, kind):
     """Written by as many ranks as go on from it; on more of them: test_the_same_bits."""
     found = runs(1, f"direct-{kind}")
     for name in ("pressure", "saturation", "fluid"):

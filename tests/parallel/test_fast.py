@@ -204,7 +204,7 @@ def test_a_disc_that_is_too_fast_near_others_still_stops_the_run(tmp_path: Path)
     assert value(sim, "vy", 1000) * -0.04 > 31.0 and value(sim, "y", 1000) < 2000.0
 
 
-def test_a_disc_that_leaves_the_box_is_deleted_at_the_next_look(tmp_path: Path) -> None:
+def test_a_disc_that_leaves_the_box_is_deleted_at_the_next_check(tmp_path: Path) -> None:
     """Although lists are hardly ever built: they are when a fast particle has left the BOX."""
     sim = bed(tmp_path, (1800.0, -200.0, 0.0, -41.0))
     walls.box(sim, -2000.0, 6000.0, -1000.0, 5000.0)

@@ -117,7 +117,7 @@ def test_growing_model_on_more_ranks(grown: Path, resident: Resident, tmp_path: 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
-def test_growth_goes_on_after_a_restart(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
+def test_growth_continues_after_a_restart(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """RES and GEN give what the run without a break gave: particles, ids, frames."""
     (tmp_path / "again").mkdir()
     shutil.copy(grown / "half.sav", tmp_path / "again")

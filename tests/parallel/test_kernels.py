@@ -153,7 +153,7 @@ def test_blocks_and_particles_in_any_order(late, tmp_path: Path, ranks: int, fir
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[MPI, SLOW])])
-def test_a_script_of_both_that_goes_on(launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_a_script_of_both_that_continues(launch: Launcher, tmp_path: Path, ranks: int) -> None:
     """The checkpoint is read while only the kernels of blocks are there."""
     (tmp_path / "watched.py").write_text(WATCHED)
     shutil.copy(ROOT / "tests" / "coupled" / "fall.sc", tmp_path)
@@ -182,7 +182,7 @@ def test_of_two_threads(late, tmp_path: Path) -> None:
     assert late(1, "both.sc", "-j", 2) == [NOTHING]
 
 
-def test_what_was_forgotten_is_told_and_kept_for_later_runs(launch: Launcher, tmp_path: Path) -> None:
+def test_what_was_forgotten_is_reported_and_kept_for_later_runs(launch: Launcher, tmp_path: Path) -> None:
     """A kernel of the particles with arguments that no run has."""
     (tmp_path / "model.py").write_text(
         "import hpcdem\nsim = hpcdem.Simulation()\nsim.box(0, 1, 0, 1)\n"

@@ -103,7 +103,7 @@ def test_a_restart_does_not_change_a_bit(alone, resident, tmp_path, ranks):
 
 
 @pytest.mark.slow
-def test_another_text_does_not_go_on(alone, launch, tmp_path):
+def test_another_text_does_not_continue(alone, launch, tmp_path):
     shutil.copytree(alone / "sticky", tmp_path / "run")
     folder = tmp_path / "run"
     (folder / "pairs.py").write_text((folder / "pairs.py").read_text() + "\n# changed\n")

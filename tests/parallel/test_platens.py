@@ -89,7 +89,7 @@ def test_the_same_across_a_restart(one: Path, resident: Resident, tmp_path: Path
 
 
 @pytest.mark.mpi
-def test_a_loaded_frame_goes_on_alike(one: Path, resident: Resident, tmp_path: Path) -> None:
+def test_a_loaded_frame_continues_alike(one: Path, resident: Resident, tmp_path: Path) -> None:
     written = []
     for ranks in (1, 2):
         folder = tmp_path / str(ranks)

@@ -38,7 +38,7 @@ def run(launch, folder: Path, ranks: int, name: str, text: str):
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_a_script_goes_on_with_the_law_that_it_names_and_with_no_other(launch, tmp_path):
+def test_a_script_continues_with_the_law_that_it_names_and_with_no_other(launch, tmp_path):
     (tmp_path / "rock.py").write_text((LAWS / "rock.py").read_text() + f"\n# {uuid.uuid4()}\n")
     whole = run(launch, tmp_path, 2, "whole", SCRIPT)
     assert whole.returncode == 0, whole.stderr

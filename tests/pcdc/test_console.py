@@ -53,7 +53,7 @@ def test_functions_and_continued_commands(bench):
         ("pcdc model step [y]", "NameError: name 'y' is not defined"),
     ],
 )
-def test_the_conversation_goes_on_after_an_error(bench, line, message):
+def test_the_conversation_continues_after_an_error(bench, line, message):
     rest = ["", ")" if line.endswith("(") else "", "m_c = 7"] if line.endswith("(") else ["m_c = 7"]
     said = talk(bench, line, *rest)
     assert bench["m_c"] == 7

@@ -225,7 +225,7 @@ def test_coupled_blocks_do_not_creep(tmp_path):
         rock("pcdc model creep on dt 1\n")
 
 
-def test_creep_of_nothing_is_said(tmp_path):
+def test_creep_of_nothing_is_reported(tmp_path):
     for model in ("mech-iso-e property den 2500 young 1e10 p-r 0.2", ""):
         rock = Rock(tmp_path / (model or "burgers")[:4], SHEAR)
         rock(f"pcdc element c-model {model}\n" if model else "")
@@ -233,7 +233,7 @@ def test_creep_of_nothing_is_said(tmp_path):
         assert any("creep is on, but no element can creep" in line for line in rock.blocks.log.lines) == bool(model)
 
 
-def test_long_creep_steps_are_said(tmp_path):
+def test_long_creep_steps_are_reported(tmp_path):
     for dt in (3e4, 5e4):
         rock = Rock(
             tmp_path / str(dt), SHEAR + f"pcdc model creep on dt {dt!r}\npcdc model solve elastic time {dt!r}\n"

@@ -42,7 +42,7 @@ def watched(ratio, window: int, limit: int = 0, steps: int = 1_000_000, broken=l
      lambda n: math.exp(-n / 60_000) * (1.1 + math.cos(n / 3000))],
     ids=["exponential", "by the number of steps", "swinging"],
 )  # fmt: skip
-def test_slow_convergence_goes_on(ratio):
+def test_slow_convergence_continues(ratio):
     assert watched(ratio, 20_000) == ("", 1_000_000)
 
 
@@ -65,7 +65,7 @@ def test_a_loose_body_is_named_and_the_script_ends(tmp_path):
     assert told.value.exit_code == 3
 
 
-def test_the_script_may_go_on_and_look(tmp_path):
+def test_the_script_may_continue_and_look(tmp_path):
     rock = Rock(tmp_path, "young = 50e9\n" + TWO + "pcdc model solve window 3000 on-failure continue\n")
     first = rock.project.solved
     assert first["reason"] == "no progress" and 3000 < first["steps"] < 5000 and first["ratio"] > 0.01
@@ -135,7 +135,7 @@ def test_the_same_in_python():
         convergence.solve(sim, limit=-1)
 
 
-def test_the_usual_window_grows_with_the_way_of_a_wave():
+def test_the_usual_window_grows_with_the_travel_time_of_a_wave():
     """4 n sqrt(1 + P / E) steps, ten times: 300 edges of joints with P = 99 E take 120 000."""
     sim = model(rectangle(300, 1, 300.0, 1.0, kind="quad"))
     sim.option(dynamic=False)

@@ -112,7 +112,7 @@ def test_what_was_chosen_is_what_is_there(desk):
      ("history create 'one' element id 18 value stress-xx", "element 18 was removed"),
      ("element c-model null range group 'void' set 'stage'", "selects no element: all that it selects")],
 )  # fmt: skip
-def test_what_is_gone_is_said_to_be_gone(desk, line, message):
+def test_what_is_gone_is_reported_to_be_gone(desk, line, message):
     with pytest.raises(HpcdemError, match=message):
         desk(OUT + f"pcdc {line}\n")
 

@@ -109,7 +109,7 @@ def test_errors_name_file_line_and_text(bench, text, message):
     assert message in failure(bench, text)
 
 
-def test_python_that_fails_shows_its_way(bench):
+def test_python_that_fails_shows_its_traceback(bench):
     told = failure(bench, "def f(x):\n    return 1 / x\n\npcdc model new\nf(0)\n")
     assert told.startswith("script.sc ended with an error\n") and "ZeroDivisionError" in told
     assert 'File "script.sc", line 5' in told and 'File "script.sc", line 2, in f' in told
@@ -121,7 +121,7 @@ def test_the_trace_shows_commands_as_they_were_written(bench):
     assert "raise ValueError('no')" in told and "__pcdc__" not in told
 
 
-def test_an_error_of_the_program_itself_is_told_whole(bench, monkeypatch):
+def test_an_error_of_the_program_itself_is_reported_whole(bench, monkeypatch):
     monkeypatch.setattr(bench.blocks, "gravity", lambda *g: 1 / 0, raising=False)
     with pytest.raises(ZeroDivisionError):
         bench("pcdc model gravity (0,1)\n")
@@ -147,7 +147,7 @@ def test_print_speaks_once(bench, capsys):
     assert capsys.readouterr().out == "a-1\n"
 
 
-def test_commands_are_told_what_the_line_says(bench):
+def test_commands_are_reported_what_the_line_says(bench):
     bench(
         "pcdc model gravity (0,-9.81)\n"
         "pcdc model option dynamic off collision on large-strain off overlap relax\n"

@@ -211,7 +211,7 @@ def test_a_script_has_the_bits_of_its_twin(tmp_path, name):
     assert moved > 0.0 and theirs.project.step > 0
 
 
-def test_a_look_at_the_scripts_finds_their_names():
+def test_a_search_of_the_scripts_finds_their_names():
     """hpcdem --check: layers, tables and groups that words of PCDC make are known, those that none makes are named."""
     for name, text in SCRIPTS.items():
         assert "warning" not in check.summary(text, "a.sc"), name

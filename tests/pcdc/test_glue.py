@@ -59,7 +59,7 @@ def test_without_it_they_part_and_with_a_joint_they_hold_up_to_its_strength(desk
         assert diagnostics.joint_counts(found.blocks)[2] == broken, t  # the bar carries 3e4 Pa
 
 
-def test_what_is_said(desk):
+def test_what_is_reported(desk):
     desk.project.blocks.log = desk.log
     desk(TWO + "pcdc mesh structured (0,1) (2,2) cells 4 2 diagonal right group 'c' set 'bodies'\npcdc mesh glue\n")
     assert "glue: 6 faces of different bodies are joints now, 8 points were merged" in desk.log.lines[-1]

@@ -63,7 +63,7 @@ def again(bench, text: str, past: list) -> None:
 
 
 @pytest.mark.parametrize("commands", [3, 4, 6, 8])
-def test_commands_up_to_the_last_are_passed_over_and_looks_are_answered(bench, tmp_path, capsys, commands):
+def test_commands_up_to_the_last_are_passed_over_and_queries_are_answered(bench, tmp_path, capsys, commands):
     from tests.pcdc.fake import Bench
 
     past = past_of(bench, LOOP, commands)
@@ -93,7 +93,7 @@ def test_commands_up_to_the_last_are_passed_over_and_looks_are_answered(bench, t
         ("pcdc geometry delete 'x'", "pcdc geometry delete 'y'", "script.sc:7: "),
     ],
 )
-def test_a_script_that_takes_another_way_is_told(bench, tmp_path, old, new, line):
+def test_a_script_that_takes_another_path_is_reported(bench, tmp_path, old, new, line):
     from tests.pcdc.fake import Bench
 
     past = past_of(bench, LOOP, 8)
@@ -128,24 +128,24 @@ def test_names_of_a_restored_file_come_back_without_the_file(bench, tmp_path):
     assert other["y"] == 3.5 and other.blocks.clock.step == 6
 
 
-def test_errors_of_looks_are_raised_again():
+def test_errors_of_queries_are_raised_again():
     first = Journal()
 
     def fails():
         raise CommandError("no such quantity")
 
     with pytest.raises(CommandError):
-        first.look(fails)
+        first.query(fails)
     first.note(COMMAND, 1)
     assert first.entries[0] == [ERROR, "CommandError", "", 0, "no such quantity"]
     second = Journal()
     second.replay(first.entries)
     with pytest.raises(CommandError, match="no such quantity"):
-        second.look(lambda: 1 / 0)
-    assert second.meet(1) and not second.replays and second.look(lambda: 7) == 7
+        second.query(lambda: 1 / 0)
+    assert second.meet(1) and not second.replays and second.query(lambda: 7) == 7
 
 
-def test_too_much_to_keep_is_told_and_refused(bench, monkeypatch):
+def test_too_much_to_keep_is_reported_and_refused(bench, monkeypatch):
     monkeypatch.setattr(journal, "MOST", 1000)
     bench(BOX + "for i in range(40):\n    x = pcdc.values('node', 'position-x')\n    pcdc model step 1\n")
     assert bench.interpreter.journal.lost and not bench.interpreter.journal.entries

@@ -59,11 +59,13 @@ def test_ambiguity_and_exact_words():
 
 def choices() -> Iterator[tuple[str, Sequence[HasKeyword]]]:
     """Every set of words among which the parser chooses."""
-    depths = max(len(way.words) for way in PCDC.ways)
+    depths = max(len(spelling.words) for spelling in PCDC.spellings)
     for depth in range(depths):
-        for start in dict.fromkeys(way.words[:depth] for way in PCDC.ways if len(way.words) > depth):
-            words = distinct([way for way in PCDC.ways if way.words[:depth] == start], depth)
-            ended = [way.command for way in PCDC.ways if way.words == start]
+        for start in dict.fromkeys(
+            spelling.words[:depth] for spelling in PCDC.spellings if len(spelling.words) > depth
+        ):
+            words = distinct([spelling for spelling in PCDC.spellings if spelling.words[:depth] == start], depth)
+            ended = [spelling.command for spelling in PCDC.spellings if spelling.words == start]
             models = ended[0].models if ended else ()
             yield " ".join(w.name for w in start) or "pcdc", [*words, *models]
     for command in PCDC.commands:

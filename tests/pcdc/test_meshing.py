@@ -122,7 +122,7 @@ def test_smooth_moves_points_but_not_those_on_lines(bench):
          "a scan line along the fractures meets none"),
     ],
 )  # fmt: skip
-def test_wishes_that_make_no_sense(bench, line, message):
+def test_settings_that_make_no_sense(bench, line, message):
     with pytest.raises(HpcdemError) as caught:
         bench(f"pcdc geometry create rectangle (0,0) (10,6) as-layer 'out'\npcdc {line}\n")
     assert str(caught.value).startswith("script.sc:2: pcdc ") and message in str(caught.value)

@@ -58,20 +58,20 @@ def _after(steps: int) -> float:
 
 
 @pytest.mark.parametrize("step", [90, 200, 333])
-def test_a_run_that_goes_on_has_the_same_bits(tmp_path, monkeypatch, step):
+def test_a_run_that_continues_has_the_same_bits(tmp_path, monkeypatch, step):
     straight = Rock(tmp_path / "a", EVERYTHING)
     again = resumed(tmp_path / "b", EVERYTHING, step, monkeypatch)
     assert motion(again) == motion(straight) and again.project.solved["steps"] == straight.project.solved["steps"]
     assert again.project.relative == {"ramp"} and again.project.step_table == "dt"
 
 
-def test_what_is_said_stays_in_a_saved_model(tmp_path):
+def test_settings_stay_in_a_saved_model(tmp_path):
     rock = Rock(tmp_path, EVERYTHING + "pcdc model save 'here'\npcdc model new\npcdc model restore 'here'\n")
     project = rock.project
     assert (tmp_path / "here.sav").is_file()
-    assert (project.run_time, project.look, project.step_table, project.relative) == (2.5e-3, 7, "dt", {"ramp"})
+    assert (project.run_time, project.check_every, project.step_table, project.relative) == (2.5e-3, 7, "dt", {"ramp"})
     rock("pcdc model new\n")
-    assert (project.run_time, project.look, project.step_table, project.relative) == (0.0, 0, "", set())
+    assert (project.run_time, project.check_every, project.step_table, project.relative) == (0.0, 0, "", set())
 
 
 @pytest.mark.slow
@@ -230,7 +230,7 @@ def test_a_level_of_water_by_a_point(tmp_path):
         Rock(tmp_path / "c", script + "pcdc node apply hydra-c-f-b flow-surface (0,1) range x 0\n")
 
 
-def test_what_has_no_effect_is_said_once(tmp_path):
+def test_what_has_no_effect_is_reported_once(tmp_path):
     rock = Rock(tmp_path, BLOCK + "pcdc model collision-detect sap\npcdc device switch-to 'GPU'\nfor k in range(3):\n"
                 "    pcdc view 'stress' target element name 'stress-yy'\npcdc model render-interval 5\n")  # fmt: skip
     told = [line for line in rock.blocks.log.lines if "no effect" in line]

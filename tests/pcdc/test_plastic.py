@@ -32,7 +32,7 @@ def run(folder: Path, *texts: str) -> Interpreter:
     return interpreter
 
 
-def test_a_pillar_yields_and_goes_on_from_a_file(tmp_path):
+def test_a_pillar_yields_and_continues_from_a_file(tmp_path):
     """Stress and flow in frames and histories; what is saved in the middle of flow goes on bit for bit."""
     middle = "pcdc model step 300\npcdc model save 'a.sav'\n"
     rest = "pcdc model step 200\npcdc output vtk 'end'\n"

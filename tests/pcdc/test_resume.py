@@ -59,7 +59,7 @@ def check_equal(one: Path, other: Path) -> None:
             assert tables(one / "data" / name) == tables(other / "data" / name), name
 
 
-def test_it_goes_on_as_if_nothing_had_happened(resident, straight, tmp_path):
+def test_it_continues_as_if_nothing_had_happened(resident, straight, tmp_path):
     folder, lines = straight
     before = stopped(resident, tmp_path / "a")
     again = start(resident, tmp_path / "a", 1, "--resume")

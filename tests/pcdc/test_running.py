@@ -255,7 +255,7 @@ def test_names_that_cannot_be_saved_do_not_end_a_run(bench, monkeypatch):
     assert any("m_f cannot be saved" in line and "no m_ names" in line for line in bench.blocks.log.lines)
 
 
-def test_a_line_in_a_loop_is_told_of_once_in_a_while(bench):
+def test_a_line_in_a_loop_is_reported_once_in_a_while(bench):
     bench(BOX + "for i in range(50):\n    pcdc model step 2\npcdc model step 3\n")
     lines = bench.blocks.log.lines
     assert sum(line.startswith("line 3: step 2") for line in lines) == 1 and "line 4: step 3" in lines

@@ -35,7 +35,7 @@ def test_the_right_model_at_the_wrong_object(line, told):
     assert told in str(error.value) and "wrong.sc:1" in str(error.value)
 
 
-def test_words_with_hyphens_are_told_with_hyphens(tmp_path: Path):
+def test_words_with_hyphens_are_reported_with_hyphens(tmp_path: Path):
     assert hyphened("tensile_strength 'tensile_strength' of m_my_name, my_file.py") == (
         "tensile-strength 'tensile_strength' of m_my_name, my_file.py"
     )

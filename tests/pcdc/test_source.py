@@ -79,7 +79,7 @@ def test_errors_name_the_line_and_show_it(text, message):
     assert message in str(caught.value)
 
 
-def test_the_first_error_of_a_command_is_told_before_python_is_looked_at():
+def test_the_first_error_of_a_command_is_reported_before_python_is_inspected():
     with pytest.raises(ScriptError, match=r"a\.sc:2: pcdc model nwe"):
         read("x = 1\npcdc model nwe\nif (\n", "a.sc")
 
@@ -96,7 +96,7 @@ def test_encodings_of_editors():
         assert str(caught.value).startswith(f"a.sc:{line}: ")
 
 
-def test_a_backslash_in_a_text_or_comment_does_not_go_on():
+def test_a_backslash_in_a_text_or_comment_does_not_continue():
     script = read("pcdc model restore 'a\\b.sav'\npcdc model new # x \\\nx = 1\n")
     assert [s.line for s in script.statements] == [1, 2] and script.statements[0].arguments["file"] == "a/b.sav"
 

@@ -180,7 +180,7 @@ def test_the_log_names_the_step_its_limit_and_the_safety_factor(rock):
     assert steps[3].startswith("warning: ") and "the safety factor 0.5 allows" in steps[3]
 
 
-def test_less_than_half_a_step_is_said(rock):
+def test_less_than_half_a_step_is_reported(rock):
     rock("pcdc model time-step value 1e-5\npcdc model solve time 4e-6\n")
     assert rock.blocks.clock.step == 0 and "less than half a time step (1e-05 s)" in rock.blocks.log.lines[-3]
 

@@ -93,7 +93,7 @@ def test_the_same_on_several_ranks(launch, alone, tmp_path):
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_restored_run_goes_on_as_the_one_that_was_not_stopped(launch, alone, tmp_path, ranks):
+def test_a_restored_run_continues_as_the_one_that_was_not_stopped(launch, alone, tmp_path, ranks):
     folder = tmp_path / "again"
     folder.mkdir()
     shutil.copy(alone / "half.sav", folder)

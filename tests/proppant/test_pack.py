@@ -57,7 +57,7 @@ def test_a_pack_carries_its_walls(modulus: float, limit: float) -> None:
     assert proppant.account()["relative"] < 1e-12
 
 
-def test_sand_that_is_no_pack_yet_bears_nothing() -> None:
+def test_sand_that_is_no_pack_yet_carries_nothing() -> None:
     """Half as much as makes a pack: until the fracture is closed to a half; and without a modulus never."""
     sim, flow, _ = closed(4e-5, 0.3, proppant_modulus=1e7)
     run(sim, 2000)
@@ -173,7 +173,7 @@ def test_a_fracture_closes_on_its_pack(dim: int, modulus: float) -> None:
     assert flow.account()["relative"] < 1e-9
 
 
-def test_the_static_solve_refuses_a_pack_that_bears() -> None:
+def test_the_static_solve_refuses_a_pack_that_carries_load() -> None:
     sim, flow, proppant = closed(0.0, proppant_modulus=1e7)
     sim.option(large_strain=False)
     with pytest.raises(CommandError, match="the static solve does not support proppant"):

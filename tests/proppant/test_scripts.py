@@ -60,7 +60,7 @@ def test_slurry_is_pumped_through_a_slot(tmp_path: Path) -> None:
     channels = fdem.queries.numbers(model, CHANNEL)
     assert c[np.isin(number, channels)] == pytest.approx(fdem.queries.values(model, CHANNEL, "concentration"))
     assert "concentration" in blocks.panels_of(frame)
-    (seen,) = coloured(blocks.draw(frame, blocks.Looks(("concentration",))))
+    (seen,) = coloured(blocks.draw(frame, blocks.Appearance(("concentration",))))
     assert np.sort(np.asarray(seen)) == pytest.approx(np.sort(c[np.isfinite(c)]))
     assert np.nanmax(c) > 0.05 and not np.nanmax(frame.of_joints["pack_pressure"]) > 0.0
     assert fdem.queries.values(model, FLOW_NODE, "proppant").sum() == pytest.approx(account["stored"])
@@ -122,7 +122,7 @@ three = pcdc.proppant
     assert found["three"]["came"] == found["two"]["came"]
 
 
-def test_stokes_is_told_apart(tmp_path: Path) -> None:
+def test_stokes_is_reported_apart(tmp_path: Path) -> None:
     """Both laws are in the log, with the Reynolds number."""
     said = {}
     for stokes in ("off", "on"):

@@ -33,7 +33,7 @@ def test_what_leaves_a_node_comes_to_the_other() -> None:
     assert nodes[:, own.N] == pytest.approx([0.264, 0.136], rel=1e-12)
 
 
-def test_only_what_is_refused_is_told() -> None:
+def test_only_what_is_refused_is_reported() -> None:
     told: list[str] = []
     log = SimpleNamespace(warn_once=lambda key, text: told.append(text))
     blocks, flow = SimpleNamespace(log=log, comm=SerialComm()), SimpleNamespace(implicit=True)
@@ -263,7 +263,7 @@ def test_what_makes_no_sense_is_refused() -> None:
             act()
 
 
-def test_what_conditions_bring_finds_room_or_is_refused() -> None:
+def test_what_conditions_bring_fits_or_is_refused() -> None:
     """Room, too little room, a pack; a part of what is there leaves, all of it at most, and none of a pack."""
     nodes, state = np.zeros((7, own.NODE)), np.zeros((7, own.STATE))
     nodes[:, own.ROOM] = 1.0
@@ -276,7 +276,7 @@ def test_what_conditions_bring_finds_room_or_is_refused() -> None:
     assert nodes[:, own.LEFT] == pytest.approx([0.0, 0.0, 0.0, 0.1, 0.3, 0.0, 0.0], abs=1e-15)
 
 
-def test_what_a_node_is_by_its_sand_and_its_room() -> None:
+def test_what_a_node_is_by_its_sand_and_its_volume() -> None:
     """Room at a quarter of a step; a pack begins at its limit, ends a hundredth below, and is pressed beyond it."""
     nodes, state = np.zeros((6, own.NODE)), np.zeros((6, own.STATE))
     nodes[:, own.ROOM_BEFORE], nodes[:, own.ROOM], nodes[:, own.VOLUME] = 2.0, 1.0, 2.0

@@ -131,7 +131,7 @@ def test_stage_shares():
     assert tables.stage_shares([a, b]) == {"force": 0.5, "move": 0.125}
 
 
-def test_disturbed_runs_are_told():
+def test_disturbed_runs_are_reported():
     """A code that does not say how much it got is not counted."""
     rows = [row("hpcdem", 0, 1.0, cpu_use=0.99), row("lammps", 0, 1.0, cpu_use=0.5), row("yade", 0, 1.0, cpu_use=None)]
     assert "1 of 2 runs" in tables.disturbed(rows) and "worst 50 %" in tables.disturbed(rows)

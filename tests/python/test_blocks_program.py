@@ -588,7 +588,7 @@ NOT_IN_PYTHON: dict[str, set[str]] = {"model option": {"creep", "ecda"}}
 """`sim.creep` says the one, and the other is on."""
 
 
-def test_every_way_to_look(bench: Bench) -> None:
+def test_every_query(bench: Bench) -> None:
     """What the object `pcdc` of a script answers, a program answers."""
     sim = program(bench)
     sim.mesh.structured((0, 0), (4, 2), (4, 2), diagonal="right")

@@ -122,7 +122,7 @@ def test_the_words_of_a_report_are_those_of_measure() -> None:
         ({"colour": 1, "color": 2}, ("color",), {"colour": 1, "color": 2}),
     ],
 )  # fmt: skip
-def test_words_that_are_spelt_in_two_ways(options, names, found) -> None:
+def test_words_that_are_spelt_with_two_spellings(options, names, found) -> None:
     assert spelt(options, names) == found
 
 

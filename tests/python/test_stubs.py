@@ -78,7 +78,7 @@ CALLS: list[tuple[tuple[int, ...], dict[str, int]]] = [
 
 
 @pytest.mark.parametrize("name", ["usual", "rest", "plain"])
-def test_what_is_wrong_with_a_call_is_said_in_the_words_of_python(name: str) -> None:
+def test_what_is_wrong_with_a_call_is_reported_in_the_words_of_python(name: str) -> None:
     method = getattr(Python(), name)
     signature = inspect.signature(method)
     for values, options in CALLS:

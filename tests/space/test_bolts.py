@@ -105,7 +105,7 @@ def test_pressure_across_the_bar_adds_friction() -> None:
         assert found == pytest.approx(wanted, rel=1e-6), name
 
 
-def test_crossed_faces_divide_it_as_a_plain_look_does() -> None:
+def test_crossed_faces_divide_it_as_a_plain_search_does() -> None:
     """Between two nodes the line stays in one element; each node but the ends is on a face."""
     mesh = box((3, 3, 3), (1.0, 1.0, 1.0), shaken=0.25)
     corners = mesh.points[mesh.cells]
@@ -160,7 +160,7 @@ def test_bolts_bring_no_force_or_moment_from_nowhere() -> None:
 
 
 @pytest.mark.parametrize("at", [20, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 150))])
-def test_a_saved_model_goes_on(at: int, tmp_path: Path) -> None:
+def test_a_saved_model_continues(at: int, tmp_path: Path) -> None:
     """Before the first step, in mid-run with hosts taken out, after rupture."""
     sim = body(box((3, 3, 3), (1.0, 1.0, 1.0)), young=5e9)
     sim.velocity_condition(nodes_on(sim.mesh, "bottom"), vx=0.0, vy=0.0, vz=0.0)

@@ -151,7 +151,7 @@ def pressed(potential: str = "distance", top: float = 10.0, **face: float) -> fl
     return float(z[below][contact[:27]].mean() - z[above][contact[27:]].mean())
 
 
-def test_a_flat_contact_gives_way_by_its_penalty() -> None:
+def test_a_flat_contact_yields_by_its_penalty() -> None:
     """p = P d (1 / h_1 + 1 / h_2), h the median altitude of a body, P = 10 E; 4 P d (1 / H_1 + 1 / H_2) of Munjiza's
     potential, H the altitudes on the surface of the elements that touch. Both lose at the rims of elements."""
     cube = box((2, 2, 2), (1.0, 1.0, 1.0), 5)

@@ -129,7 +129,7 @@ def test_friction_is_that_of_the_plain_reference(length: float) -> None:
 
 
 @pytest.mark.parametrize("length", [0.0, 0.4])
-def test_a_closed_way_costs_nothing(length: float) -> None:
+def test_a_closed_path_costs_nothing(length: float) -> None:
     """The work along an ellipse through another tetrahedron falls with the square of the step and is all but nothing
     beside what goes in and comes out."""
     one, other = T2

@@ -245,7 +245,7 @@ def test_creep_steps_that_follow_the_change() -> None:
     assert grown[-1] > 10.0 * grown[0] and all(b >= a for a, b in itertools.pairwise(grown))
 
 
-def test_it_goes_on_in_mid_creep(tmp_path: Path) -> None:
+def test_it_continues_in_mid_creep(tmp_path: Path) -> None:
     """Saved within a creep step, and gone on from: the same bits."""
     ends = []
     for again in (False, True):

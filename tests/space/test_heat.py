@@ -563,7 +563,7 @@ class Log:
         logging.info(text)
 
 
-def test_obtuse_tetrahedra_are_told() -> None:
+def test_obtuse_tetrahedra_are_reported() -> None:
     """Boxes of six tetrahedra have none; a flat one has, and its heat flows to the warmer corner."""
     for points, some in (
         (box((2, 2, 2), (1.0, 1.0, 1.0)).points, False),

@@ -331,7 +331,7 @@ def test_import(tmp_path):
     convergence.advance(sim, 2)
 
 
-def test_tetrahedra_that_lock_are_told_of_and_hexahedra_are_not():
+def test_tetrahedra_that_lock_are_reported_and_hexahedra_are_not():
     for made, told in ((box((2, 1, 1), (1.0, 0.5, 0.5)), True), (hexes((2, 1, 1), (1.0, 0.5, 0.5)), False)):
         sim = body(made, poisson_ratio=0.49)
         log = Heard()

@@ -64,7 +64,7 @@ def test_it_parts_and_slips_as_in_the_plane(of) -> None:
     assert liners.values("liner-element", "gap") == pytest.approx(1e-4, rel=1e-3)
 
 
-def test_hosts_let_go_elements_are_deleted_and_put_back() -> None:
+def test_hosts_release_supports_elements_are_deleted_and_put_back() -> None:
     sim, liners = slab(young=1e9)
     drawn(sim, liners, 50, at_z=-1e-6)
     liners.remove_conditions(np.arange(len(liners)))
@@ -110,7 +110,7 @@ def test_the_account_of_energy_closes() -> None:
 
 
 @pytest.mark.parametrize("at", [0, 60, 200])
-def test_a_saved_model_goes_on(at: int, tmp_path: Path) -> None:
+def test_a_saved_model_continues(at: int, tmp_path: Path) -> None:
     sim, liners = slab(True, 5e9, tensile_strength=0.3e6, compressive_strength=1e6, bond_tensile_strength=1e5)
     sim.table("pull", [(0.0, 0.0), (1e-3, 0.5)])
     liners.condition(np.array([0]), does_z=VELOCITY, at_z="pull", does_turn_x=VELOCITY, at_turn_x=3.0)

@@ -80,7 +80,7 @@ def test_cracks_are_measured(alone: Path, tmp_path: Path) -> None:
         assert 0.0 < row["opening[m]"] < 0.1 * state.time and row["slip[m]"] < 0.1 * row["opening[m]"]
 
 
-def test_what_joints_took_is_told_in_joules(alone: Path) -> None:
+def test_what_joints_took_is_reported_in_joules(alone: Path) -> None:
     """At least gf1 of the area that broke."""
     path = alone / "data" / "history_lost.csv"
     assert "[J]" in path.read_text(encoding="utf-8").splitlines()[0]

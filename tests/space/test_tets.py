@@ -144,7 +144,7 @@ def test_principal_stresses_of_a_last_frame() -> None:
         assert np.array_equal(np.delete(diagnostics.values(sim, one), sim.number[2]), np.delete(before, sim.number[2]))
 
 
-def test_what_is_stored_is_given_back() -> None:
+def test_what_is_stored_is_released() -> None:
     """Kinetic and elastic energy of a body that rings freely: without damping their sum stays."""
     sim = body(box((4, 3, 3), (1.0, 0.75, 0.75), split=12))
     changes.set_velocity(sim, [0], 2.0, 1.0, -1.0)
@@ -198,7 +198,7 @@ def test_a_plane_that_holds_nodes(slope: tuple[float, float, float]) -> None:
     assert np.allclose(held, -2700.0 * (n @ (1.0, 2.0, -9.0)) * n, rtol=1e-9)
 
 
-def test_a_checkpoint_with_spare_words_goes_on(tmp_path: Path) -> None:
+def test_a_checkpoint_with_spare_words_continues(tmp_path: Path) -> None:
     """Where storage and lists were made had rows of sixteen words once."""
     sim = body(box((2, 2, 2), (0.02, 0.02, 0.02)))
     sim.option(collision=True)

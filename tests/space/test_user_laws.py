@@ -199,7 +199,7 @@ def test_a_restart_knows_what_a_law_remembers(of: Any, tmp_path: Path) -> None:
     assert np.isnan(diagnostics.values(sim, "strain_energy")).all()
 
 
-def test_states_stand_in_frames_and_histories(tmp_path: Path) -> None:
+def test_states_are_in_frames_and_histories(tmp_path: Path) -> None:
     """Of a script with warm hexahedra."""
     shutil.copy(LAWS, tmp_path)
     text = """

@@ -236,7 +236,7 @@ def test_what_cannot_act_is_refused(scarp: str, tmp_path, words, message) -> Non
         ({"spacing": 200.0, "slope": 5.0}, "one column .spacing 200 m. covers everything"),
     ],
 )
-def test_a_process_that_finds_nothing_to_do_tells(scarp: str, tmp_path, words, message) -> None:
+def test_a_process_that_finds_nothing_to_do_reports_it(scarp: str, tmp_path, words, message) -> None:
     sim = restored(scarp, tmp_path)
     said = io.StringIO()
     sim.log = Log(stream=said)

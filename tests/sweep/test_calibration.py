@@ -53,7 +53,7 @@ def test_blind_recovery(true):
     assert influence[0].argmax() == 0 and influence[1].argmax() == 1
 
 
-def test_what_the_targets_cannot_tell():
+def test_what_the_targets_cannot_determine():
     only = lambda points: np.log(forward(points))[:, :, 2:]  # noqa: E731
     result = calibrate(only, RANGES, [Target("UCS", float(np.log(4e7)), 0.03)], first=12, rounds=1, batch=4)
     told = " ".join(result.cautions())

@@ -200,7 +200,7 @@ def test_a_sweep_survives_kills_and_its_report_is_that_of_an_undisturbed_one(tmp
     assert len(table(one)) > 20
 
 
-def test_a_driver_that_is_asked_to_stop_lets_members_save_and_goes_on(tmp_path):
+def test_a_driver_that_is_asked_to_stop_lets_members_save_and_continues(tmp_path):
     (tmp_path / "push.py").write_text(parametrised_push(40000))
     words = ["push.py", "--set", "friction=0.1,0.4", "--jobs", "1"]
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path)

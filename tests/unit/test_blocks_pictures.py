@@ -76,7 +76,7 @@ def test_what_is_read_is_what_was_written(tmp_path, make):
             assert (values == its[column]).all(), column
 
 
-def test_foreign_and_damaged_files_are_told(tmp_path):
+def test_foreign_and_damaged_files_are_reported(tmp_path):
     particles = tmp_path / "all_0000000001.vtkhdf"
     write_vtkhdf(particles, make_frame(5), SerialComm())
     assert not is_mesh_frame(particles) and not is_mesh_frame(tmp_path / "none.vtkhdf")
@@ -199,8 +199,8 @@ class TestPictures:
 
     def test_each_crack_has_the_colour_of_its_kind(self, tmp_path):
         broken = ((1, 1.0), (5, 1.5), (9, 2.0))  # right sides of the squares 0, 2 and 4
-        looks = blocks.Looks(panels=("cracks",), dpi=150)
-        path = blocks.plot(state_of(strip(broken=broken)), tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0))
+        appearance = blocks.Appearance(panels=("cracks",), dpi=150)
+        path = blocks.plot(state_of(strip(broken=broken)), tmp_path / "a.png", appearance, View(0.0, 6.0, 0.0, 1.0))
         seen = self.pixels(path)
         # The axes are the widest dark rectangle; cracks stand at 1, 3 and 5 sixths of it.
         inside = seen[seen.shape[0] // 2]
@@ -217,17 +217,17 @@ class TestPictures:
     def test_same_frame_same_bytes_in_every_format(self, tmp_path):
         state = state_of(strip(broken=((1, 1.0),)))
         for suffix in saved.FORMATS:
-            one = blocks.plot(state, tmp_path / f"a{suffix}", blocks.Looks(dpi=60)).read_bytes()
-            assert blocks.plot(state, tmp_path / f"b{suffix}", blocks.Looks(dpi=60)).read_bytes() == one, suffix
+            one = blocks.plot(state, tmp_path / f"a{suffix}", blocks.Appearance(dpi=60)).read_bytes()
+            assert blocks.plot(state, tmp_path / f"b{suffix}", blocks.Appearance(dpi=60)).read_bytes() == one, suffix
         with pytest.raises(HpcdemError, match="pictures end in"):
             blocks.plot(state, tmp_path / "a.bmp")
         with pytest.raises(UsageError, match="too small"):
-            blocks.plot(state, tmp_path / "a.png", blocks.Looks(page=2.0))
+            blocks.plot(state, tmp_path / "a.png", blocks.Appearance(page=2.0))
         assert not (tmp_path / "a.bmp").exists()
 
     def test_stress_is_shaded_by_its_amount(self, tmp_path):
-        looks = blocks.Looks(panels=("stress",), dpi=100, ranges={"stress": (0.0, 4e6)})
-        seen = self.pixels(blocks.plot(state_of(strip()), tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0)))
+        appearance = blocks.Appearance(panels=("stress",), dpi=100, ranges={"stress": (0.0, 4e6)})
+        seen = self.pixels(blocks.plot(state_of(strip()), tmp_path / "a.png", appearance, View(0.0, 6.0, 0.0, 1.0)))
         width = seen.shape[1]
         row = seen[seen.shape[0] // 2].sum(axis=1)
         assert row[int(0.25 * width)] > row[int(0.7 * width)] + 60  # 1 MPa is paler than 3
@@ -238,8 +238,8 @@ class TestPictures:
         state.of_elements["plastic_shear_strain"] = np.where(np.arange(12) < 6, 0.0, 0.02)
         assert blocks.panels_of(state) == ("cracks", "stress", "plastic") and blocks.plastic_range(state) == (0.0, 0.02)
         assert len(blocks.draw(state).axes) == 5  # three panels, two of them with a bar of colours
-        looks = blocks.Looks(panels=("plastic",), dpi=100)
-        seen = self.pixels(blocks.plot(state, tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0)))
+        appearance = blocks.Appearance(panels=("plastic",), dpi=100)
+        seen = self.pixels(blocks.plot(state, tmp_path / "a.png", appearance, View(0.0, 6.0, 0.0, 1.0)))
         row = seen[seen.shape[0] // 2].sum(axis=1)
         assert row[int(0.25 * seen.shape[1])] > row[int(0.7 * seen.shape[1])] + 60
 

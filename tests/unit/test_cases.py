@@ -135,7 +135,7 @@ def test_what_is_of_space_is_refused_in_the_plane():
     assert find("ucs")(dim="3") == find("ucs")(dim=3)
 
 
-def test_a_script_is_told_its_line(tmp_path):
+def test_a_script_is_reported_its_line(tmp_path):
     bench = Bench(tmp_path)
     with pytest.raises(HpcdemError, match=r"script\.sc:3: UCS has no parameter 'sise'"):
         bench("from hpcdem.cases import UCS\npcdc model new\nUCS(sise=1)")
@@ -294,7 +294,7 @@ print('found %.17g %.17g' % (result.peak, result.modulus))
 """
 
 
-def test_a_stopped_case_goes_on(resident, written, tmp_path):
+def test_a_stopped_case_continues(resident, written, tmp_path):
     (tmp_path / "a.sc").write_text(STOPPED)
     (tmp_path / "stop").touch()
     done = resident(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)

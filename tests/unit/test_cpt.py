@@ -29,7 +29,7 @@ def test_a_continuous_table_runs_linearly_within_its_slices() -> None:
     assert colour(text, 5.001) == [4, 5, 6]
 
 
-def test_outside_is_black_and_white_unless_the_table_tells_and_nan_is_never_painted() -> None:
+def test_outside_is_black_and_white_unless_the_table_says_otherwise_and_nan_is_never_painted() -> None:
     text = "0 10 20 30 1 40 50 60\n"
     assert colour(text, -1.0) == [0, 0, 0] and colour(text, 2.0) == [255, 255, 255]
     result = parse_cpt(text + "N 1 2 3\nB -\n").colours(np.array([[np.nan, -1.0], [0.5, 2.0]]))

@@ -136,7 +136,7 @@ def test_the_start_costs_next_to_nothing(make_machine, tmp_path):
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_what_is_wrong_at_the_start_is_said_once(make_machine):
+def test_what_is_wrong_at_the_start_is_reported_once(make_machine):
     machine = make_machine({"proc/meminfo": "MemAvailable: 100 kB\n"}, places=places(2))
     (line,) = doctor.start_warnings(machine, SerialComm())
     assert line.startswith("50 KiB of memory for each of 2 ranks (free 100 KiB): a rank needs") and "Cure: " in line
@@ -148,7 +148,7 @@ def test_a_check_that_fails_ends_nothing(make_machine):
 
     machine = make_machine(limits=broken)
     assert doctor.start_warnings(machine, SerialComm()) == []
-    texts = [finding.text for _, _, finding in doctor.look(machine)]
+    texts = [finding.text for _, _, finding in doctor.inspect(machine)]
     assert "the check shell_limits itself failed: ValueError: a limit nobody has heard of" in texts
 
 
@@ -166,7 +166,7 @@ def test_sizes_as_people_write_them():
     ]  # fmt: skip
 
 
-def test_every_host_has_one_rank_that_looks():
+def test_every_host_has_one_rank_that_checks():
     machines = [Machine(places(2, host="a") + places(2, host="b"), rank) for rank in range(4)]
     assert [m.first_of_host for m in machines] == [True, False, True, False]
     assert machines[3].hosts == ["a", "b"] and len(machines[3].here) == 2
@@ -373,7 +373,7 @@ def room(free: int = 1 << 40, inodes: int = 10**6, counted: bool = True) -> Simp
         (room(inodes=0, counted=False), None, ""),
     ],
 )
-def test_room(make_machine, monkeypatch, found, level, text):
+def test_disk_space(make_machine, monkeypatch, found, level, text):
     machine = make_machine()
     monkeypatch.setattr(os, "statvfs", lambda path: found)
     for look in (storage.free_space, storage.temporary):
@@ -464,7 +464,7 @@ def test_hosts_that_see_different_folders(make_machine, tmp_path, monkeypatch):
     assert not bad(storage.shared(make_machine(places=places(2), token=tmp_path / "unseen")))
 
 
-def test_the_file_that_all_hosts_look_for_is_made_and_removed(make_machine, monkeypatch):
+def test_the_file_that_all_hosts_search_is_made_and_removed(make_machine, monkeypatch):
     """Of two hosts this one has rank 0; without the file the check would wait, and fail."""
     monkeypatch.setattr(doctor, "CHECKS", (doctor.Check(storage.shared, each_host=True),))
     monkeypatch.setattr(storage, "SOON", 0.0)
@@ -762,7 +762,7 @@ JOB = {"SLURM_JOB_ID": "7"}
 SIGNAL = "#!/bin/bash\n#SBATCH --ntasks=4\n#SBATCH --signal=USR1@300  # five minutes\nsrun hpcdem push.py\n"
 
 
-def test_nothing_is_said_outside_a_job(make_machine):
+def test_nothing_is_reported_outside_a_job(make_machine):
     for look in (host.slurm_end, host.sbatch_cores, software.slurm_mpi_type):
         assert not list(look(make_machine(library=MPICH)))
 

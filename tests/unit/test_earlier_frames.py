@@ -121,7 +121,7 @@ def test_a_resumed_run_keeps_its_frames_and_no_others(tmp_path: Path) -> None:
     assert stems(tmp_path) == [all_(0), all_(100), all_(200), all_(300)]
 
 
-def test_a_script_that_restores_goes_on_from_the_frames_before(tmp_path: Path) -> None:
+def test_a_script_that_restores_continues_from_the_frames_before(tmp_path: Path) -> None:
     """RES of a checkpoint of the folder at step 200: what led there is the beginning of this run, what came after it in
     the other one is not, nor is the first frame of the command after."""
     put(tmp_path, all_(0), all_(100), all_(200), all_(200, True), all_(300))
@@ -228,7 +228,7 @@ def test_sections_and_pages_of_the_run_before_are_left_out(folder: Path) -> None
         say(zdemss, "zdemss", folder, "-d")
 
 
-def test_a_frame_that_is_named_is_looked_at(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_frame_that_is_named_is_inspected(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = next(folder.glob(f"{all_(4000)}.*"))
     info.work(COMM, Log(), {"paths": [path], "as_json": False, "every": False})  # type: ignore[arg-type]
     assert ", complete" in capsys.readouterr().out

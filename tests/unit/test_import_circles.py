@@ -73,7 +73,7 @@ def test_few_folders_import_each_other():
     assert 40 < len(pairs) <= 80, sorted(pairs)
 
 
-def test_the_top_floor_has_few_rooms_and_a_short_plan():
+def test_the_top_floor_has_few_folders_and_a_short_plan():
     """At most 18 of them, each on the plan of ARCHITECTURE.md, which a newcomer reads in one go."""
     rooms = top_folders()
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")

@@ -62,16 +62,16 @@ def test_the_bytes_are_those_of_a_file_written_at_once(tmp_path: Path, write) ->
     assert same == [True, True]
 
 
-def test_an_error_is_raised_once_by_look_or_settle(tmp_path: Path) -> None:
+def test_an_error_is_raised_once_by_poll_or_settle(tmp_path: Path) -> None:
     later = Deliveries()
     write_sections(tmp_path / "no" / "a.txt", COMM, lambda: [b"x"], later)
     write_sections(tmp_path / "b.txt", COMM, lambda: [b"x"], later)
     later.wait()
     with pytest.raises(HpcdemError, match=r"^cannot write .*a\.txt: the folder does not exist$"):
-        later.look(COMM)
+        later.poll(COMM)
     with pytest.raises(HpcdemError, match="the folder does not exist"):
         later.settle(COMM)
-    later.look(COMM)
+    later.poll(COMM)
     later.settle(COMM)
     assert os.listdir(tmp_path) == ["b.txt"], "the next file is written all the same"
 
@@ -81,7 +81,7 @@ def test_looking_waits_for_no_disk(tmp_path: Path) -> None:
     gate = Gate(later)
     write_sections(tmp_path / "no" / "a.txt", COMM, lambda: [b"x"], later)
     later.go()
-    later.look(COMM)  # nothing is known yet
+    later.poll(COMM)  # nothing is known yet
     gate.open.set()
     with pytest.raises(HpcdemError):
         later.settle(COMM)

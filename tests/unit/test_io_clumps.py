@@ -133,7 +133,7 @@ def test_lines_that_cannot_be_carried_out(resident: Resident, tmp_path, line, me
     assert not list(tmp_path.rglob("*.vtkhdf"))
 
 
-def test_check_tells_of_the_file(resident: Resident, tmp_path):
+def test_check_reports_the_file(resident: Resident, tmp_path):
     """--check counts the discs, and says when the file is not there."""
     done = resident(1, "--check", script(tmp_path, "CLUMP file a.clumps x 3"), cwd=tmp_path)
     assert done.returncode == 0 and "CLUMP file a.clumps x 3" in done.stdout

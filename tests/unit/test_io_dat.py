@@ -118,7 +118,7 @@ def public_reader(path: Path) -> dict[str, Any]:
     return {name: rows if name == "group" else rows[:-1] for name, rows in lists.items()}
 
 
-def test_public_readers_find_what_they_look_for(tmp_path: Path) -> None:
+def test_public_readers_find_what_they_expect(tmp_path: Path) -> None:
     frame = make_frame(60)
     found = public_reader(written(tmp_path, frame))
     particles, contacts, bonds = (frame.tables[k].columns for k in ("particles", "contacts", "bonds"))

@@ -122,7 +122,7 @@ def test_groups_restrict_all_three(folder, tmp_path):
         run(folder, "cracks", "--groups", "top", "-o", tmp_path)
 
 
-def test_old_frames_do_not_tell_neighbours(tmp_path):
+def test_old_frames_do_not_record_neighbours(tmp_path):
     frame = strip(0, BEFORE)
     del frame.corners.columns["node"]
     save(tmp_path, frame)

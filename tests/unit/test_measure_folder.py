@@ -102,7 +102,7 @@ def test_wedge_of_the_last_frame(folder: Path) -> None:
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("kind", ["vtkhdf", "dat"])
 @pytest.mark.parametrize(("fix", "counts"), [(3, False), (7, False), (1, True), (0, True)])
-def test_rows_that_stand_for_walls_are_no_surface(
+def test_rows_that_represent_walls_are_no_surface(
     folder: Path, tmp_path: Path, kind: str, fix: int, counts: bool
 ) -> None:
     """A column of particles 17 km high at the left end, fixed along x and y: the crest is that of the bed. Fixed along
@@ -283,7 +283,7 @@ def test_cracks_count_what_broke_and_not_what_was_deleted(folder: Path) -> None:
     assert damage["0"] == 1.0 and damage["1"] == damage["10"] == 0.5 and damage["7"] == 0.0 and "100" not in damage
 
 
-def test_the_log_tells_tension_from_shear(folder: Path, tmp_path: Path) -> None:
+def test_the_log_distinguishes_tension_from_shear(folder: Path, tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     log.write_text("hello\nstep 3000 | CYC | 9 particles, 8 contacts, 7 bonds (1 broken in tension, 2 in shear) | x\n")
     run(folder, "cracks", "--log", log, "-o", tmp_path, figures=True)

@@ -183,7 +183,7 @@ def test_nearest_particles_and_spread_points() -> None:
 # --- walls and cracks --------------------------------------------------------------------------------------------
 
 
-def test_work_is_the_integral_of_the_force_over_the_way() -> None:
+def test_work_is_the_integral_of_the_force_over_the_path() -> None:
     """A spring pushed in by s: work k s^2 / 2, exact by the trapezoidal rule; force across the way does no work."""
     s = np.linspace(0.0, 300.0, 31)
     curve = walls.Curve(np.arange(31), 0.1 * np.arange(31), np.stack([s, 0.0 * s], 1), np.stack([-4.0 * s, 7.0 + s], 1))

@@ -81,7 +81,7 @@ def test_one_program_may_write_twice_into_a_folder(tmp_path):
     enter(tmp_path)
 
 
-def test_a_lock_is_given_back(tmp_path):
+def test_a_lock_is_released(tmp_path):
     lock = FolderLock(tmp_path, {"pid": 2})
     assert holder_of(tmp_path) == {"pid": 2}
     with pytest.raises(Taken):

@@ -168,7 +168,7 @@ def test_what_is_wrong_with_a_command_line_is_named(words, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_a_wrong_command_line_is_said_once(launch):
+def test_a_wrong_command_line_is_reported_once(launch):
     done = launch(3, "--nonsense", "a.py")
     assert done.returncode == 2
     assert done.stderr.count("No such option") == 1
@@ -181,7 +181,7 @@ def test_a_missing_script(resident, tmp_path):
 
 
 @pytest.mark.mpi
-def test_a_missing_script_is_said_once(launch, tmp_path):
+def test_a_missing_script_is_reported_once(launch, tmp_path):
     done = launch(3, "nowhere.py", cwd=tmp_path)
     assert done.returncode == 2 and done.stderr.count("no such script") == 1
 

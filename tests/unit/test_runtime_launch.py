@@ -94,7 +94,7 @@ def test_copies_of_rank_0_are_refused_by_one_of_them(launch, rank, code):
     assert ("MVAPICH started 4 processes" in done.stdout and "rank 0 of 1" in done.stdout) is (rank == 0)
 
 
-def test_the_way_out_is_named(monkeypatch):
+def test_the_remedy_is_named(monkeypatch):
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
     text = launching.copies_of_rank_0(Launcher("Slurm", 4, 0), "Open MPI v4.1.4")
     assert "4 processes" in text and "Open MPI v4.1.4" in text and "mpiexec" in text

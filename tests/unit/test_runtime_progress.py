@@ -112,7 +112,7 @@ def test_a_log_file_gets_a_line_each_ten_seconds(log, out, clock):
     assert out.getvalue().count("\nstep") == 10
 
 
-def test_the_folder_is_told_how_far_it_is(log, clock, tmp_path):
+def test_the_folder_is_reported_how_far_it_is(log, clock, tmp_path):
     """Once a second, from the second second on; of a command that went on from a checkpoint with what was before."""
     log.script_started("a.py", 400)
     log.command_started("CYC", 3, 100, 50, before=20)
@@ -258,7 +258,7 @@ def test_a_reader_that_goes_away_does_not_end_the_run():
     assert err == "still here\n"
 
 
-def test_a_disk_that_is_full_for_a_while_leaves_a_gap_that_is_told(tmp_path):
+def test_a_disk_that_is_full_for_a_while_leaves_a_gap_that_is_reported(tmp_path):
     """A log that goes to a file: what finds no room is lost, what comes later is there, and the run goes on."""
     code = (
         "import os, sys\nfrom hpcdem.runtime.progress import Log, write\nlog = Log()\n"
@@ -306,7 +306,7 @@ def test_warnings_that_differ_in_numbers_alone_are_counted(log, out):
     ]
 
 
-def test_where_commands_are_typed_each_warning_is_said(log, out):
+def test_where_commands_are_typed_each_warning_is_reported(log, out):
     log.folds = False
     for _ in range(6):
         log.warn("once more")

@@ -139,7 +139,7 @@ def test_checkpoint_code(launch, tmp_path):
 
 
 @pytest.mark.mpi
-def test_an_error_with_a_message_on_its_way(launch, tmp_path):
+def test_an_error_with_a_pending_message(launch, tmp_path):
     """A receive that nobody will answer must not keep MPI from ending."""
     work = "comm.mpi.Irecv(np.empty(8), source=(comm.rank + 1) % comm.size); raise CommandError('stop here')"
     done = run(launch, tmp_path, work)

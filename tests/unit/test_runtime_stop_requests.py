@@ -39,7 +39,7 @@ def test_nothing_is_asked_for_at_first(stop):
     assert stop.poll(SerialComm()) == "none"
 
 
-def test_sigusr2_saves_once_and_goes_on(stop):
+def test_sigusr2_saves_once_and_continues(stop):
     send("SIGUSR2")
     assert stop.local_request() == SAVE
     assert stop.poll(SerialComm()) == "save"
@@ -80,7 +80,7 @@ def test_a_request_of_another_rank_counts(stop):
     assert "another rank" in stop.reason
 
 
-def test_signals_are_given_back():
+def test_signals_are_restored():
     before = signal.getsignal(signal.SIGTERM)
     StopRequests().install().uninstall()
     assert signal.getsignal(signal.SIGTERM) is before

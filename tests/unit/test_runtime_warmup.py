@@ -158,7 +158,7 @@ def test_docstrings_and_comments_change_no_digest_of_kernels() -> None:
         ], name
 
 
-def test_kernels_of_a_factory_are_told_apart_by_what_was_put_into_them(base):
+def test_kernels_of_a_factory_are_reported_apart_by_what_was_put_into_them(base):
     import numba
 
     kept.install()
@@ -326,7 +326,7 @@ def compiled(apart):
 
 
 @pytest.mark.parametrize("apart", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_kernels_of_two_processes_are_told_apart(tmp_path, apart):
+def test_kernels_of_two_processes_are_reported_apart(tmp_path, apart):
     """Without names of their own they are not: then this precaution is no longer needed."""
     (tmp_path / "factory.py").write_text(FACTORY)
     env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
@@ -655,7 +655,7 @@ def test_as_many_processes_as_the_control_group_allows(processes, monkeypatch, l
     assert hits()["of_an_intrinsic"] == ((0, 1) if alone else (1, 0))
 
 
-def test_processes_that_fail_are_told_and_this_one_compiles(processes, base):
+def test_processes_that_fail_are_reported_and_this_one_compiles(processes, base):
     said = processes("fails")
     assert said.count("warning: processes that compiled kernels failed") == 1
     assert "(exit codes 1, 1; no such thing)" in said

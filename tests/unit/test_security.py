@@ -290,7 +290,7 @@ def test_a_long_expression_has_a_value(text, value):
     ["{top}" + "*9e99" * 10, "1" + "/{left}" * MANY, "{left}/{left}" + "+0" * MANY],
     ids=["overflow", "zeros", "zero by zero"],
 )
-def test_values_that_do_not_exist_are_told_in_a_short_line(text):
+def test_values_that_do_not_exist_are_reported_in_a_short_line(text):
     with pytest.raises(CommandError) as caught:
         expression(Token(text, 1, 1), "push.py").value(EXTENTS)
     assert len(str(caught.value)) < 200

@@ -170,7 +170,7 @@ def test_between_nodes() -> None:
     assert np.isnan(grids.between(grid, np.full((3, 4, 1), np.nan), x, y)).all()
 
 
-def test_sums_against_the_plain_way() -> None:
+def test_sums_against_a_plain_loop() -> None:
     x, y, radius = cloud(800)
     grid = grids.cover(SIZE, x, y, radius)
     assert grid.x[0] <= (x - radius).min() and grid.x[-1] >= (x + radius).max() and (grid.x % SIZE == 0.0).all()

@@ -276,7 +276,7 @@ def test_a_file_as_zdem_writes_it(tmp_path: Path) -> None:
     text = (ROOT / "tests" / "unit" / "io_zdem_2.2.dat").read_text()
     path = tmp_path / "all_0000000100.dat"
     path.write_text(text)
-    seen = strain_stress.look(path, strain_stress.Options(tmp_path, size=110.0))
+    seen = strain_stress.read_snapshot(path, strain_stress.Options(tmp_path, size=110.0))
     assert seen.gid.tolist() == [0, 4, 7] and seen.held.all()
     centre = {0: (100.5, 61.25), 4: (61.0, 148.0), 7: (190.125, 80.0)}
 
@@ -315,7 +315,7 @@ def behind_a_row(frames: list[Frame], far: float = 0.0) -> list[Frame]:
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_rows_that_stand_for_walls_are_in_no_field_and_carry_no_surface(
+def test_rows_that_represent_walls_are_in_no_field_and_carry_no_surface(
     frames: list[Frame], tmp_path: Path, smooth: bool
 ) -> None:
     plain = [moved(frames[0], step, np.array([[1.0, k], [0.0, 1.0]])) for step, k in ((0, 0.0), (500, 0.3))]

@@ -108,7 +108,7 @@ def frame() -> Frame:
 def section_of(frame: Frame, folder: Path, size: float = 200.0) -> tuple:
     write_vtkhdf(folder / "all_0000000000.vtkhdf", frame, SerialComm())
     options = strain_stress.Options(folder, size=size)
-    seen = strain_stress.look(folder / "all_0000000000.vtkhdf", options)
+    seen = strain_stress.read_snapshot(folder / "all_0000000000.vtkhdf", options)
     return seen, strain_stress.make_section(seen, np.tile(strain.IDENTITY, (len(seen.gid), 1)), size)
 
 

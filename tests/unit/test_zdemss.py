@@ -113,7 +113,7 @@ def test_ours_comes_by_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.slow
-def test_pages_are_drawn_by_several_processes_with_a_word_on_the_way(tmp_path: Path) -> None:
+def test_pages_are_drawn_by_several_processes_with_a_word_meanwhile(tmp_path: Path) -> None:
     """The same bytes as by one."""
     sections = [wedge(step, 1000.0 * step, radius=300.0) for step in range(2)]
     line = "--width 8 --format png --strainvol OFF --stressmean OFF --stressshear OFF"
@@ -149,7 +149,7 @@ def test_nobody_measures_the_boxes_of_numbers_for_a_title(monkeypatch: pytest.Mo
         ("-d x --colour red", "No such option"),
     ],
 )
-def test_what_is_not_understood_is_said(line: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_not_understood_is_reported(line: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         options(line)
     shown = capsys.readouterr()
@@ -446,7 +446,7 @@ def test_a_series_shows_every_section_with_its_caption() -> None:
     assert len(figure.axes) == 4  # and one colour bar
 
 
-def test_captions_tell_how_far_the_walls_have_come() -> None:
+def test_captions_show_how_far_the_walls_have_come() -> None:
     outlines = [survey.outline(wedge(k, push, k == 0)) for k, push in ((0, 0.0), (5, 2000.0))]
     captions = survey.progress(outlines, (1000.0, "km"))
     assert captions["all_0000000000_ini"] == "step 0, initial"

@@ -140,7 +140,7 @@ def test_vectors_of_discs_and_walls_too(tmp_path: Path):
     np.testing.assert_array_equal(moment.of("particles").values("velocity_x", ""), np.arange(25.0))
 
 
-def test_what_a_click_tells_has_units_by_size(tmp_path: Path):
+def test_what_a_click_shows_has_units_by_size(tmp_path: Path):
     viewer = Viewer(Sources([frames.write_blocks(tmp_path, grown=0.3)]))
     view = ModelView(layers=(Layer(object="elements"),), camera=(3.0, 3.6, 2.6, 3.0)).model_dump()
     found = viewer.pick({"view": view, "width": 20, "height": 20, "column": 10, "row": 10})

@@ -64,7 +64,7 @@ def test_what_is_no_filter_is_refused_at_once(text):
     assert time.process_time() - began < 1.0
 
 
-def test_what_is_said():
+def test_what_is_reported():
     with pytest.raises(HpcdemError, match=r"filter 'nix > 1': unknown field nix; known: x, y, state, id, group_rock"):
         chosen("nix > 1", 5, FIELDS, groups)
     with pytest.raises(HpcdemError, match=r"'x.real' is not allowed in a filter"):

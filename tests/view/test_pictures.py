@@ -132,7 +132,7 @@ def test_what_is_asked_of_one_object_is_read_of_it_alone(rock: Moment, sand: Mom
                 np.testing.assert_array_equal(value, whole[-1])
 
 
-def test_columns_that_nobody_asks_for_are_let_go():
+def test_columns_that_nobody_asks_for_are_released():
     read = []
 
     def reader(name: str) -> Callable[[slice], np.ndarray]:
@@ -265,7 +265,7 @@ def test_groups_have_a_legend_of_names(rock: Moment):
     assert layer.kind.tolist() == [0] * 7 + [1] * 3
 
 
-def test_joints_have_the_colours_of_the_way_they_broke(rock: Moment):
+def test_joints_have_the_colours_of_the_mode(rock: Moment):
     layer = scene(rock, bare(Layer(object="joints"))).layers[0]
     assert layer.rows.tolist() == [2] and layer.legend == [("tension", "#c81e1e")]
 
@@ -451,7 +451,7 @@ def test_what_a_frame_holds_is_listed(tmp_path: Path, capsys: pytest.CaptureFixt
     assert not list(tmp_path.glob("*.png"))
 
 
-def test_foreign_and_half_frames_are_told(tmp_path: Path):
+def test_foreign_and_half_frames_are_reported(tmp_path: Path):
     path = frames.write_blocks(tmp_path)
     path.write_bytes(path.read_bytes()[:3000])
     with pytest.raises(HpcdemError, match=path.name):

@@ -137,7 +137,7 @@ def test_each_pixel_shows_the_nearest_face():
 @pytest.mark.some_of_each
 @pytest.mark.parametrize("eye", ["-y", "+x", "iso", "0.2,-1,0.4"])
 @pytest.mark.parametrize("section", ["", "1.9,1.4,0.9,1,-1,1"])
-def test_a_pixel_tells_the_element_that_is_there(tmp_path: Path, eye: str, section: str):
+def test_a_pixel_shows_the_element_that_is_there(tmp_path: Path, eye: str, section: str):
     """The place in front at a pixel, a little inside, lies in the element that the pixel tells."""
     moment = straight(tmp_path)
     view = ModelView(layers=(Layer(object="elements"),), eye=eye, section=section)
@@ -180,7 +180,7 @@ def painted(moment: Moment, **values: Any) -> Picture:
     return paint(scene(moment, view), 60, 50)
 
 
-def test_what_shines_through_hides_nothing_and_is_told_last(tmp_path: Path):
+def test_what_shines_through_hides_nothing_and_is_reported_last(tmp_path: Path):
     moment = straight(tmp_path, broken=True)
     whole, glass, none = painted(moment), painted(moment, opacity=0.3), painted(moment, filter="z > 1")
     middle = 25, 30

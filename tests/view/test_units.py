@@ -42,7 +42,7 @@ def test_blocks(tmp_path: Path) -> None:
     view = ModelView(layers=(Layer(object="elements", field="stress_yy", vectors="velocity"),))
     assert {"stress yy (MPa)", "x (mm)", "y (mm)", "velocity 10 mm/s"} <= said(figure_of(scene(moment, view)))
     state = replace(read_mesh_frame(path), supports={})
-    assert {"compressive stress (MPa)", "x (mm)"} <= said(blocks.draw(state, blocks.Looks(panels=("stress",))))
+    assert {"compressive stress (MPa)", "x (mm)"} <= said(blocks.draw(state, blocks.Appearance(panels=("stress",))))
     viewer = Viewer(Sources([path]))
     assert ["displacement", "mm"] in viewer.fields({"object": "elements"})["fields"]
     assert viewer.about({})["lengths"] == [(0.0, 1.0, "mm")]

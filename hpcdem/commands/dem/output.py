@@ -241,7 +241,7 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
 def report(sim: Simulation, _: Snapshot | None = None) -> None:
     """Write a row per wall to `walls.csv`, and the progress line if one is due."""
     with sim.timers("output"):
-        _under_way.look(sim.comm)
+        _under_way.poll(sim.comm)
         force = diagnostics.wall_forces(sim)
         w, clock = sim.walls, sim.clock
         rows, walls = [], []
@@ -284,7 +284,7 @@ def warn_of_overlaps(sim: Simulation) -> None:
 def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
     """Write a row of `energy.csv`: the present energy budget."""
     with sim.timers("output"):
-        seen = dataclasses.asdict(sim.energy.look(sim))
+        seen = dataclasses.asdict(sim.energy.evaluate(sim))
         of_rolling = {name: seen.pop(name) for name in OF_ROLLING}
         of_physics = physics_energies(sim) | (of_rolling if sim.rolling is not None else {})
         numbers = (repr(v) for v in (sim.clock.time, *seen.values(), *of_physics.values()))
@@ -301,7 +301,7 @@ def report_energy(sim: Simulation) -> None:
     """Log the energy budget as a table at the end of a run; does nothing without SET energy. Collective."""
     if sim.energy is None or sim.energy.start is None:
         return
-    seen, of_physics = sim.energy.look(sim), physics_energies(sim)
+    seen, of_physics = sim.energy.evaluate(sim), physics_energies(sim)
     if sim.log is None:
         return
     values = {

@@ -47,7 +47,7 @@ def with_energy(threads: int = 1) -> None:
     cycles.prepare(sim)
     sim.rebuild()
     sim.step()
-    sim.energy.look(sim)
+    sim.energy.evaluate(sim)
 
 
 def with_clumps(threads: int = 1) -> None:

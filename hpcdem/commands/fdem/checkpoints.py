@@ -177,7 +177,7 @@ def _state(project: Project) -> dict[str, Any]:
         "clocks": {
             "run_time": project.run_time,
             "began": project.began,
-            "look": project.look,
+            "look": project.check_every,
             "step_table": project.step_table,
             "relative": sorted(project.relative),
         },
@@ -218,7 +218,7 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     project.solved = {name: math.nan if value is None else value for name, value in solved.items()}
     project.adapts = bool(state["adapts"])
     clocks = state.get("clocks", {})
-    project.run_time, project.look = float(clocks.get("run_time", 0.0)), int(clocks.get("look", 0))
+    project.run_time, project.check_every = float(clocks.get("run_time", 0.0)), int(clocks.get("look", 0))
     project.began = {name: float(time) for name, time in clocks.get("began", {}).items()}
     project.step_table, project.relative = str(clocks.get("step_table", "")), set(clocks.get("relative", ()))
     project.dynamic, project.in_use, project.taken = bool(state["dynamic"]), bool(state["in_use"]), mesh is not None

@@ -31,7 +31,7 @@ def solve_check(project: Project, steps: int) -> None:
     """Set the number of steps between two evaluations of the ratio."""
     if steps < 1:
         raise CommandError(f"solve-check: a whole number above 0 is needed, got {steps}")
-    project.look = steps
+    project.check_every = steps
 
 
 def cycle_option(project: Project, **parts: Mapping[str, Any]) -> None:

@@ -29,12 +29,12 @@ def image(
     title: str | None = None,
     full: bool = False,
     where: Range | None = None,
-    **looks: Any,
+    **appearance: Any,
 ) -> None:
     """Draw the present state into `<file>_<step>.png` in the output folder (.pdf or .svg with that extension). view: a
-    file *.mv; field: quantity that colours these objects (default: the first objects that have it); looks: values of
-    `hpcdem.post.view.model.Layer`; full: the colour scale covers all values; camera: corners of the visible part of the
-    plane [m]; eye, section: in space, as in `hpcdem.post.view.model.ModelView`; where: objects to draw. Collective.
+    file *.mv; field: quantity that colours these objects (default: the first objects that have it); appearance: values
+    of `hpcdem.post.view.model.Layer`; full: the colour scale covers all values; camera: corners of the visible part of
+    the plane [m]; eye, section: in space, as in `hpcdem.post.view.model.ModelView`; where: objects to draw. Collective.
     """
     from hpcdem.post.view.model import ModelView, read_view
     from hpcdem.post.view.moment import of_blocks
@@ -52,7 +52,7 @@ def image(
         for of in ("elements", "joints"):
             only.setdefault(of, everything(project, SHOWN[of], (UseHidden(False),)))
     settings = project.to_read(view) if view else None
-    looks |= {"limits": "full"} if full else {}
+    appearance |= {"limits": "full"} if full else {}
     step = project.step
     path = project.to_write(project.folder() / f"{stem}_{step:010d}{suffix if suffix in FIGURES else FIGURES[0]}")
     state = frames.whole(project)
@@ -71,7 +71,7 @@ def image(
         draw(
             moment,
             path,
-            adjusted(shown, moment, field.replace("-", "_") or None, object or None, looks, **more),
+            adjusted(shown, moment, field.replace("-", "_") or None, object or None, appearance, **more),
             only=only or None,
         )
 

@@ -49,8 +49,8 @@ class Project:
 
     Script. line: present line, for the log; names: returns the variables of the script to be saved in a checkpoint;
     place: returns the path to the present position in the script; progress: of the present command that steps, see
-    running.py; stepping: name of that command, "" none; told: time of the last log entry by line of the script; inputs:
-    files that the script reads, by real path, with a description; made: files written by name.
+    running.py; stepping: name of that command, "" none; logged_at: time of the last log entry by line of the script;
+    inputs: files that the script reads, by real path, with a description; made: files written by name.
 
     Restart. resumed: this run resumes from a checkpoint of the folder; restored: checkpoint that the script named, and
     its step; calls_lost: that checkpoint has no methods of particles; resume_advice: how to resume from a checkpoint of
@@ -73,7 +73,7 @@ class Project:
         self.progress: dict[str, Any] | None = None
         self.resumed = False
         self.restored: tuple[Path, int] | None = None
-        self.told: dict[int, float] = {}
+        self.logged_at: dict[int, float] = {}
         self.coupled: Coupled | None = None
         self.continues: Path | None = None
         self.inputs: dict[str, str] = {}
@@ -137,7 +137,7 @@ class Project:
         self.adapts = False
         self.run_time = 0.0
         self.began: dict[str, float] = {}
-        self.look = 0
+        self.check_every = 0
         self.step_table = ""
         self.relative: set[str] = set()
         self.networks = 0

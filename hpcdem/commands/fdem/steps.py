@@ -515,7 +515,7 @@ def _advance(
     # A checkpoint of a version that did not watch has none.
     watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
     reason, found = progress.get("ended", ["", math.nan])
-    look = project.look or (CHECK_DYNAMIC if project.dynamic else CHECK_STATIC)
+    check = project.check_every or (CHECK_DYNAMIC if project.dynamic else CHECK_STATIC)
     report, creeps = _Report(project, name, last), "creep" in progress
     if not creeps:
         frames.write_due(project)
@@ -526,7 +526,7 @@ def _advance(
         if histories.wait(project):
             due = clock.step + 1
         if ratio is not None:
-            due = min(due, after(clock.step, look, first))
+            due = min(due, after(clock.step, check, first))
         request = _to(project, int(min(due - clock.step, _within(project, end))))
         if (clock.step - first) % STRIDE == 0:
             _follow_step_table(project)
@@ -536,12 +536,12 @@ def _advance(
             histories.record(project, more)
             frames.write_due(project)
         cracks.record(project)
-        if ratio is not None and ((clock.step - first) % look == 0 or clock.step == last):
+        if ratio is not None and ((clock.step - first) % check == 0 or clock.step == last):
             found = diagnostics.unbalanced_ratio(blocks)
             reason = "ratio" if found <= ratio else watch.failed(clock.step, found, diagnostics.joint_counts(blocks)[2])
             done = progress.get("done", False) or bool(reason)
             progress.update(watch=asdict(watch), done=done, ended=[reason, found])
-        report.tell(blocks)
+        report.log_progress(blocks)
         if coupling.checkpoint_is_due(project):
             histories.flush(project)
             cracks.flush(project)
@@ -660,31 +660,31 @@ class _Report:
     def __init__(self, project: Project, name: str, last: float) -> None:
         self.project, self.name, self.last = project, name, last
         self.first = project.step if project.progress is None else project.progress["first"]
-        self.began = self.told = clocks.monotonic()
+        self.began = self.logged_at = clocks.monotonic()
         self.began_step = self.reported_step = project.step
-        before = project.told.get(project.line)
+        before = project.logged_at.get(project.line)
         self.speaks = project.comm.bcast(before is None or self.began - before >= QUIET_SECONDS)
         where = f"line {project.line}: " if project.line else ""
         if project.log is not None and self.speaks:
-            project.told[project.line] = self.began
+            project.logged_at[project.line] = self.began
             project.log.info(f"{where}{name}")
 
-    def tell(self, blocks: Blocks) -> None:
+    def log_progress(self, blocks: Blocks) -> None:
         """Collective: the line, if one is due."""
         now = clocks.monotonic()
         if self.project.log is not None:
             self.project.log.at(blocks.clock.step, self.name, self.first, self.last)
-        if self.project.log is None or not self.project.comm.bcast(now - self.told >= QUIET_SECONDS):
+        if self.project.log is None or not self.project.comm.bcast(now - self.logged_at >= QUIET_SECONDS):
             return
         done = blocks.clock.step - self.reported_step
-        speed = done / max(now - self.told, 1e-9)
+        speed = done / max(now - self.logged_at, 1e-9)
         left = f" | left {duration((self.last - blocks.clock.step) / speed)}" if self.last < math.inf and speed else ""
-        under_way.look(self.project.comm)
+        under_way.poll(self.project.comm)
         elements = int(self.project.alive.sum())
         self.project.log.info(
             f"{self._state(blocks)} | {rate(speed)} steps/s, {rate(speed * elements)} element-steps/s{left}"
         )
-        self.told, self.reported_step, self.speaks = now, blocks.clock.step, True
+        self.logged_at, self.reported_step, self.speaks = now, blocks.clock.step, True
 
     def _state(self, blocks: Blocks) -> str:
         clock = blocks.clock

@@ -408,7 +408,7 @@ def carry_out(call: Call) -> None:
         return
     CONVERTERS.get((call.model or command).does, by_name)(call)
     if call.project.units:
-        units.look(call.project.units, call.project.log, _measured(call))
+        units.check(call.project.units, call.project.log, _measured(call))
 
 
 def _measured(call: Call) -> Iterator[units.Given]:

@@ -61,7 +61,7 @@ class Interpreter:
         self.journal: Journal | None = None
         self._own_names: dict[str, Any] = {
             "__name__": "__main__", "__builtins__": __builtins__, "math": math, "Vector": Vector, "print": self._print,
-            "pcdc": Model(project, self.look), CALL: self._carry_out,
+            "pcdc": Model(project, self.query), CALL: self._carry_out,
         }  # fmt: skip
         self.namespace = dict(self._own_names)
         self._included_at: int | None = None
@@ -278,7 +278,7 @@ class Interpreter:
         """A journal is kept: --resume will run this script again."""
         return self.journal is not None and not self.journal.lost
 
-    def look(self, make: Callable[[], Any], together: str = "") -> Any:
+    def query(self, make: Callable[[], Any], together: str = "") -> Any:
         """Answer a query of the script about the model. together: the query, if all ranks must make it at the same
         time."""
         journal = self.journal
@@ -289,7 +289,7 @@ class Interpreter:
                 self._agree(READ, f"{file}:{line}: {together}")
             return make()
 
-        return ask() if journal is None else self._placed(lambda: journal.look(ask))
+        return ask() if journal is None else self._placed(lambda: journal.query(ask))
 
     def ask(
         self, key: tuple[Any, ...], make: Callable[[], Any], again: Callable[[], Any] | None = None,

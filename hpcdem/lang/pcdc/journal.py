@@ -73,7 +73,7 @@ class Journal:
         elif type(error).__name__ in _ERRORS:
             self.note(ERROR, type(error).__name__, "", 0, str(error))
 
-    def look(self, make: Callable[[], Any]) -> Any:
+    def query(self, make: Callable[[], Any]) -> Any:
         """Return the result of `make`, or the recorded one when replaying."""
         if self.replays:
             self._fail_again()
@@ -95,11 +95,11 @@ class Journal:
         tried again then, the error is."""
         if not self.replays:
             self.note(ASK, checksum)
-            return self.look(make)
+            return self.query(make)
         self._meet_call(checksum)
         if again is None:
             self.call_again()
-            return self.look(make)
+            return self.query(make)
         if fails_again:
             self._fail_again()
         try:

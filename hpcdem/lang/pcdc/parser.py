@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Vector, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
-from hpcdem.lang.pcdc.table import INSTEAD, PROPERTY, RANGE, Command, Level, Model, Option, Table, Way
+from hpcdem.lang.pcdc.table import INSTEAD, PROPERTY, RANGE, Command, Level, Model, Option, Spelling, Table
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
@@ -43,10 +43,10 @@ class Refused(ValueError):
     """A word that is known and refused, with what to do instead."""
 
 
-def trace(words: str, table: Table, dim: int | None) -> tuple[Command, Way, list[str]]:
+def trace(words: str, table: Table, dim: int | None) -> tuple[Command, Spelling, list[str]]:
     """The command of a line, the words that named it, and all words of the line in full. ValueError; Refused."""
     line = _Line(words, table, dim)
-    return line.statement("", 0, "", 0).command, line.way, line.trail
+    return line.statement("", 0, "", 0).command, line.spelling, line.trail
 
 
 class _Line:
@@ -61,7 +61,7 @@ class _Line:
         self.expressions = kinds.Expressions()
         self.context = "pcdc"
         self.wanted: Sequence[Any] = ()
-        self.way = Way(table.commands[0], ())
+        self.spelling = Spelling(table.commands[0], ())
         self.trail: list[str] = []
         """Keywords that were read, in full."""
         self.rows: Sequence[Option] = ()
@@ -146,9 +146,9 @@ class _Line:
         """The words of a command, one after the other."""
         begun: tuple[str, ...] = ()
         while True:
-            level, ways = self.table.level(begun)
+            level, spellings = self.table.level(begun)
             depth = len(begun)
-            ended = next((way for way in ways if len(way.words) == depth), None)
+            ended = next((spelling for spelling in spellings if len(spelling.words) == depth), None)
             found = self.take(level)
             if found is None:
                 if ended is not None and (ended.own or not self._is_unknown(ended.command)):
@@ -157,9 +157,9 @@ class _Line:
                 self.unknown(token, level)
             begun = (*begun, found.keyword.notation)
             self.context = f"{self.context} {found.keyword}" if depth else found.keyword.name
-            _, ways = self.table.level(begun)
-            if len(ways) == 1 and len(ways[0].words) == len(begun):
-                return self._allowed(ways[0])
+            _, spellings = self.table.level(begun)
+            if len(spellings) == 1 and len(spellings[0].words) == len(begun):
+                return self._allowed(spellings[0])
 
     def _is_unknown(self, command: Command) -> bool:
         """Return whether the next word cannot continue this command when its last word is omitted."""
@@ -167,8 +167,8 @@ class _Line:
         rows: tuple[Any, ...] = (*command.options, *command.models)
         return token is None or (isinstance(token, Word) and not matching(token.text, rows))
 
-    def _allowed(self, way: Way) -> Command:
-        command, self.way = way.command, way
+    def _allowed(self, spelling: Spelling) -> Command:
+        command, self.spelling = spelling.command, spelling
         self.refuse_elsewhere(command.name, command.dims)
         if command.refused:
             raise Refused(f"'{self.context}' is rejected: {command.refused}")

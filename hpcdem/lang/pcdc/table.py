@@ -173,9 +173,9 @@ class Command:
         return _keywords(self.notation)
 
     @cached_property
-    def ways(self) -> tuple[Way, ...]:
+    def spellings(self) -> tuple[Spelling, ...]:
         """The words of the command and its alternative names."""
-        return (Way(self, self.words), *(Way(self, _keywords(words), own=False) for words in self.also))
+        return (Spelling(self, self.words), *(Spelling(self, _keywords(words), own=False) for words in self.also))
 
     @cached_property
     def name(self) -> str:
@@ -191,7 +191,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Way:
+class Spelling:
     """Words that name a command; own: those that it is called by here."""
 
     command: Command
@@ -210,9 +210,12 @@ def _keywords(notation: str) -> tuple[Keyword, ...]:
     return tuple(Keyword(word, _SPELLINGS.get(word, ())) for word in notation.split())
 
 
-def distinct(ways: Iterable[Way], depth: int) -> list[Level]:
+def distinct(spellings: Iterable[Spelling], depth: int) -> list[Level]:
     """The words at this place of the commands, each once."""
-    return [Level(word) for word in dict.fromkeys(way.words[depth] for way in ways if len(way.words) > depth)]
+    return [
+        Level(word)
+        for word in dict.fromkeys(spelling.words[depth] for spelling in spellings if len(spelling.words) > depth)
+    ]
 
 
 @dataclass(frozen=True)
@@ -223,19 +226,23 @@ class Table:
     range_terms: tuple[Option, ...] = field(default=())
 
     @cached_property
-    def ways(self) -> tuple[Way, ...]:
+    def spellings(self) -> tuple[Spelling, ...]:
         """Return all words that name commands."""
-        return tuple(way for command in self.commands for way in command.ways)
+        return tuple(spelling for command in self.commands for spelling in command.spellings)
 
     @cached_property
-    def _levels(self) -> dict[tuple[str, ...], tuple[list[Level], list[Way]]]:
+    def _levels(self) -> dict[tuple[str, ...], tuple[list[Level], list[Spelling]]]:
         return {}
 
-    def level(self, begun: tuple[str, ...]) -> tuple[list[Level], list[Way]]:
+    def level(self, begun: tuple[str, ...]) -> tuple[list[Level], list[Spelling]]:
         """Words that may follow on these notations, and all words of commands that begin with them."""
         if begun not in self._levels:
-            ways = [way for way in self.ways if tuple(w.notation for w in way.words[: len(begun)]) == begun]
-            self._levels[begun] = distinct(ways, len(begun)), ways
+            spellings = [
+                spelling
+                for spelling in self.spellings
+                if tuple(w.notation for w in spelling.words[: len(begun)]) == begun
+            ]
+            self._levels[begun] = distinct(spellings, len(begun)), spellings
         return self._levels[begun]
 
     def command(self, name: str) -> Command:

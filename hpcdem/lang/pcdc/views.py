@@ -75,27 +75,27 @@ class Model(Accounts):
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
     def __init__(self, project: Any, look: Callable[..., Any]) -> None:
-        self._project, self._look = project, look
+        self._project, self._query = project, look
 
     def _now(self, ask: Callable[[Any], Any]) -> Any:
-        return self._look(lambda: ask(self._project))
+        return self._query(lambda: ask(self._project))
 
     @property
     def time(self) -> float:
         """Model time [s]."""
-        return self._look(lambda: float(self._project.blocks.clock.time))
+        return self._query(lambda: float(self._project.blocks.clock.time))
 
     @property
     def cycle(self) -> int:
         """Steps done."""
-        return self._look(lambda: int(self._project.blocks.clock.step))
+        return self._query(lambda: int(self._project.blocks.clock.step))
 
     @property
     def solved(self) -> dict[str, Any]:
         """Outcome of the last `model solve`: "reason" (ratio, cycles, time; without equilibrium: no progress, limit,
         runaway), "ratio" at the end (NaN if not evaluated), "steps" it took. Empty before the first.
         """
-        return self._look(lambda: dict(self._project.solved))
+        return self._query(lambda: dict(self._project.solved))
 
     @property
     def rank(self) -> int:
@@ -105,11 +105,11 @@ class Model(Accounts):
     @property
     def wells(self) -> dict[str, dict[str, float]]:
         """Wells by name: pressure [Pa], rate [m2/s], injected [m2], stage."""
-        return self._look(lambda: fdem.queries.wells(self._project))
+        return self._query(lambda: fdem.queries.wells(self._project))
 
     def field(self, name: str) -> dict[str, float]:
         """The account of a field of elements, as "moisture": given, commands, stored, removed, closing, relative."""
-        return self._look(lambda: fdem.fields.account(self._project, name))
+        return self._query(lambda: fdem.fields.account(self._project, name))
 
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
@@ -130,17 +130,17 @@ class Model(Accounts):
         mesh, with present=True by where they are now; of a group of elements (face_of=), of elements by number
         (element=), or as RANGE has it between=, boundary=True, crack=True."""
         query = f"numbers {kind} {where}"
-        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)), query)
+        return self._query(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)), query)
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
         """A quantity by name, in the order of numbers; of nodes with face_of= or element= on their side."""
         query = f"values {kind} {name} {where}"
-        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)), query)
+        return self._query(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)), query)
 
     def total(self, kind: str, name: str, **where: Any) -> float:
         """Exact sum of a quantity."""
         query = f"total {kind} {name} {where}"
-        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)), query)
+        return self._query(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)), query)
 
     def history(self, name: str) -> np.ndarray:
         """(n, 3) step, time and value of what a history has recorded."""
@@ -148,7 +148,7 @@ class Model(Accounts):
         def rows() -> np.ndarray:
             return np.array(fdem.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
 
-        return self._look(rows)
+        return self._query(rows)
 
 
 class View:

@@ -193,7 +193,7 @@ def check_units(sim: Any, command: str, given: Mapping[str, Any]) -> None:
     settings = getattr(sim, "settings", None)
     if row is not None and settings is not None and settings.units:
         of = {option.key: option.unit for option in (*row.leading, *row.options) if option.unit}
-        units.look(settings.units, sim.log, ((name, of[name], given[name]) for name in of if name in given))
+        units.check(settings.units, sim.log, ((name, of[name], given[name]) for name in of if name in given))
 
 
 def check_same_beginning(script: Script, saved_text: str, position: int) -> None:

@@ -59,16 +59,17 @@ def kinds(blocks: Blocks, faces: np.ndarray) -> np.ndarray:
 
 
 class Link:
-    """The contacts that can come about while discs and faces have not gone `room` [m] towards each other. Collective.
+    """The contacts that can come about while discs and faces have not approached each other by more than `margin` [m].
+    Collective.
 
     Arrays of discs and slots are those of physics/coupling/kernels/disc_faces.py; face_row, face_k, face_k2,
     face_force: of owned faces with discs near, in ascending order.
     """
 
-    def __init__(self, particles: Simulation, blocks: Blocks, room: float, known: Touching) -> None:
+    def __init__(self, particles: Simulation, blocks: Blocks, margin: float, known: Touching) -> None:
         self.comm = particles.comm
         self.particles, self.blocks = particles, blocks
-        self.room = room
+        self.margin = margin
         self.made_for = particles.rebuilds, blocks.rebuilds, particles.closed
         p = particles.particles
         self._rows = np.arange(p.owned.start, p.owned.stop)
@@ -102,7 +103,7 @@ class Link:
         comm, hot = self.comm, self.particles.particles.hot[self._rows]
         box = np.full((comm.size, 4), -math.inf)  # -left, right, -bottom, top
         if len(hot):
-            x, y, r = hot[:, X], hot[:, Y], hot[:, RADIUS] + self.room
+            x, y, r = hot[:, X], hot[:, Y], hot[:, RADIUS] + self.margin
             box[comm.rank] = -(x - r).min(), (x + r).max(), -(y - r).min(), (y + r).max()
         comm.max_into(box)
         left, right, bottom, top = box.T * np.array([[-1.0], [1.0], [-1.0], [1.0]])
@@ -139,7 +140,7 @@ class Link:
         """Discs near the rectangle around places (n, 2): rows in the order of cells, keys of these, side of a cell."""
         hot = self.particles.particles.hot
         rows = self._rows
-        side = (float(hot[rows, RADIUS].max()) if len(rows) else 1.0) + self.room
+        side = (float(hot[rows, RADIUS].max()) if len(rows) else 1.0) + self.margin
         if not len(places) or not len(rows):
             return rows[:0], np.empty(0, np.int64), side
         low, high = places.min(axis=0) - side, places.max(axis=0) + side
@@ -154,10 +155,10 @@ class Link:
         rows, key, side = self._discs_by_cells(faces[:, 2:].reshape(-1, 2))
         hot, places = self.particles.particles.hot, np.ascontiguousarray(faces[:, 2:])
         pairs = np.empty((4 * len(rows) + 16, 2), np.int64)
-        n = int(disc_faces.near(hot, rows, key, side, places, self.room, pairs))
+        n = int(disc_faces.near(hot, rows, key, side, places, self.margin, pairs))
         if n > len(pairs):
             pairs = np.empty((n, 2), np.int64)
-            disc_faces.near(hot, rows, key, side, places, self.room, pairs)
+            disc_faces.near(hot, rows, key, side, places, self.margin, pairs)
         return pairs[:n]
 
     def _make_slots(self, faces: np.ndarray, pairs: np.ndarray) -> None:
@@ -243,7 +244,7 @@ class Link:
             return blocks.where[e], k, (k + 1) % corner_counts(cells[e])
 
         self._asked = {rank: corners(wanted[of]) for rank, of in _runs(askers).items()}
-        self._told = {rank: np.empty((len(rows), ENDS)) for rank, (rows, *_) in self._asked.items()}
+        self._outgoing = {rank: np.empty((len(rows), ENDS)) for rank, (rows, *_) in self._asked.items()}
         self._ends = {rank: self.ends[of] for rank, of in _runs(owner).items()}
         # The way back: slots by the owner of their face.
         to = owner[self.slot_face]
@@ -262,7 +263,8 @@ class Link:
         if comm.mpi is None:
             return
         for into, outof, incoming, tag in (
-            (self._to_discs, self._told, self._ends, TO_DISCS), (self._to_faces, self._back, self._pieces, TO_FACES),
+            (self._to_discs, self._outgoing, self._ends, TO_DISCS),
+            (self._to_faces, self._back, self._pieces, TO_FACES),
         ):  # fmt: skip
             others = (incoming.keys() | outof.keys()) - {comm.rank}
             for rank in sorted(others):
@@ -286,9 +288,9 @@ class Link:
         timers = self.blocks.timers
         with timers("couple"):
             for rank, (rows, k, k2) in self._asked.items():
-                disc_faces.pack(rows, k, k2, x, v, self._told[rank])
+                disc_faces.pack(rows, k, k2, x, v, self._outgoing[rank])
         with timers("exchange"):
-            self._travel(self._to_discs, self._told, self._ends)
+            self._travel(self._to_discs, self._outgoing, self._ends)
 
     def deliver(self) -> None:
         """Forces of contacts to the owners of the faces, added up there by faces. Collective."""

@@ -33,7 +33,7 @@ from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
 __all__ = ["Coupled"]
 
-ROOM = 0.5
+MARGIN = 0.5
 """Largest displacement of discs and faces towards each other between two searches, over the largest radius."""
 SAFETY = 0.8
 """Part of the stability limit that is used."""
@@ -180,7 +180,7 @@ class Coupled(SurfaceLoad):
             p = particles.particles
             radii = p["radius"]
             largest = float(self.comm.max_into(np.array([radii.max(initial=0.0)]))[0])
-            self.link = Link(particles, blocks, ROOM * largest if largest > 0.0 else 1.0, self._known)
+            self.link = Link(particles, blocks, MARGIN * largest if largest > 0.0 else 1.0, self._known)
             self._known = Touching.nothing()
             self._renew_laws()
         self._check_rebuild()
@@ -204,7 +204,7 @@ class Coupled(SurfaceLoad):
         if found[4] >= 0.0:
             link.stop_on_breakthrough(int(found[4]))
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
-        margin, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
+        margin, stride = link.margin - path_d - path_b, (speed_d + speed_b) * dt
         if glance and not self._check_interval.is_too_late(margin - 2.0 * stride, stride):
             return False
         self.late += margin < 0.0

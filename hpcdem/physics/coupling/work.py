@@ -96,7 +96,7 @@ class Work:
         found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored, "stored_before": before}
         found["lost"] = -(discs + faces) - (stored - before)
         if self.both.particles.energy is not None and self.both.blocks.budget is not None:
-            one, other = self.both.particles.energy.look(self.both.particles), of_blocks.energies(self.both.blocks)
+            one, other = self.both.particles.energy.evaluate(self.both.particles), of_blocks.energies(self.both.blocks)
             flows = [abs(v) for name, v in vars(one).items() if name not in ("closing", "relative")]
             flows += [abs(v) for name, v in other.items() if name not in ("closing", "relative")]
             return closed(found, one.closing + other["closing"], flows)

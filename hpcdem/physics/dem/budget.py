@@ -144,7 +144,7 @@ class Budget(engine.Budget[Simulation, int]):
     def _book_change(self, change: dict[str, int]) -> None:
         self.accounts["commands"] += sum(change.values())
 
-    def look(self, sim: Simulation) -> Energy:
+    def evaluate(self, sim: Simulation) -> Energy:
         """The budget now. The model must be closed. Collective."""
         found = self.now(sim)
         total = [_summed(sim, list(part.values())) for part in found]

@@ -69,7 +69,7 @@ HALVINGS = 8
 CUTS, FINE = 6, 10
 """Largest number of halvings of a load increment without equilibrium; the same where joints soften."""
 TRIES = 3
-"""Elastic ways in an increment that need not bring forces nearer to balance."""
+"""Number of elastic iterations of an increment that may increase the unbalanced forces."""
 STILL = 1e-6
 """Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
 strength that follows tables, quads."""
@@ -292,17 +292,17 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     of_nodes = np.zeros(len(nodes.lead), np.int64)
     of_nodes[there] = sim.rows_of_nodes(nodes.lead[there], sim.node)[0]
     table, dim = _mean_conditions(sim, cycles), sim.dim
-    free, way, step = (np.empty((len(table), *shape)) for shape in ((dim,), (dim, dim), (dim,)))
+    free, basis, step = (np.empty((len(table), *shape)) for shape in ((dim,), (dim, dim), (dim,)))
     for row, one in enumerate(table):
         points = nodes.point[there & (of_nodes == row)]
-        free[row], way[row], step[row] = 1.0, np.eye(dim), 0.0
+        free[row], basis[row], step[row] = 1.0, np.eye(dim), 0.0
         if row and len(points):
-            free[row], way[row], step[row] = _freedom(sim, one, int(points.min()))
-    free, way, step = free[of_nodes], way[of_nodes], step[of_nodes]
+            free[row], basis[row], step[row] = _freedom(sim, one, int(points.min()))
+    free, basis, step = free[of_nodes], basis[of_nodes], step[of_nodes]
     free[nodes.lead < 0] = step[nodes.lead < 0] = 0.0
     number = np.full(free.shape, -1, np.int64)
     number[free > 0.0] = np.arange(int((free > 0.0).sum()))
-    return Unknowns(number, way, step * cycles, ~(way == np.eye(dim)).all(axis=(1, 2)))
+    return Unknowns(number, basis, step * cycles, ~(basis == np.eye(dim)).all(axis=(1, 2)))
 
 
 def _mean_conditions(sim: Blocks, cycles: int) -> np.ndarray:
@@ -340,7 +340,7 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.n
         raise CommandError(f"node {point} has a prescribed acceleration: there is no equilibrium")
     at = np.where(does == moving.VELOCITY, at, 0.0)
     if kind == moving.FIXED:
-        free, way, step = np.zeros(sim.dim), np.eye(sim.dim), np.zeros(sim.dim)
+        free, basis, step = np.zeros(sim.dim), np.eye(sim.dim), np.zeros(sim.dim)
     elif kind in (moving.ALONG, space.ACROSS):
         touched, oblique = held & (along != 0.0), np.abs(along).max() < 1.0
         if oblique and held.any() and not held.all() and (kind == space.ACROSS or touched.any()):
@@ -348,32 +348,33 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.n
                 f"node {point} moves {'along' if kind == moving.ALONG else 'across'} an oblique line and has some "
                 "components prescribed: the static solve supports a move constraint alone, or with all components"
             )
-        way, first = _ways(along)
+        basis, first = _basis(along)
         free = np.zeros(sim.dim)
         step = float(at @ along) * along
         if kind == space.ACROSS:
             free, step = (np.ones(sim.dim) if oblique and not held.all() else (~held).astype(float)), at - step
         free[first] = float(kind == moving.ALONG and not touched.any())
     else:
-        free, way, step = (~held).astype(float), np.eye(sim.dim), at
+        free, basis, step = (~held).astype(float), np.eye(sim.dim), at
     if sim.options.dynamic and step.any():
         raise CommandError(
             f"node {point} moves at a prescribed velocity: there is no equilibrium in dynamic mode; in static mode "
             "(model option dynamic off) it moves that far per unit of time"
         )
-    return free, way, step
+    return free, basis, step
 
 
-def _ways(along: np.ndarray) -> tuple[np.ndarray, int]:
-    """Orthogonal ways, as columns, one of them the unit vector `along` (dim,), and which one: the axes, if it is one of
-    them, else those that a reflection makes of them (Householder)."""
+def _basis(along: np.ndarray) -> tuple[np.ndarray, int]:
+    """Orthogonal basis, as columns, one of them the unit vector `along` (dim,), and its index: the axes, if it is one
+    of them, else those that a reflection makes of them (Householder).
+    """
     dim, first = len(along), int(np.argmax(np.abs(along)))
     if abs(along[first]) == 1.0:
         return np.eye(dim), first
     normal = along - np.eye(dim)[0]
-    way = np.eye(dim) - 2.0 * np.outer(normal, normal) / (normal @ normal)
-    way[:, 0] = along
-    return way, 0
+    basis = np.eye(dim) - 2.0 * np.outer(normal, normal) / (normal @ normal)
+    basis[:, 0] = along
+    return basis, 0
 
 
 def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
@@ -391,7 +392,7 @@ def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
     rigid = rigid_movements(arm / size[body][:, None])
     modes = rigid.shape[2]
     bound = unknowns.number[use] < 0
-    along = np.einsum("nck,ncm->nkm", unknowns.way[use], rigid) * bound[:, :, None]
+    along = np.einsum("nck,ncm->nkm", unknowns.basis[use], rigid) * bound[:, :, None]
     squares = np.einsum("nkm,nkl->nml", along, along)
     gram = np.zeros((len(count), modes, modes))
     some = bound.any(axis=1)
@@ -405,11 +406,11 @@ def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
     at = there[bad[0]]
     members = np.flatnonzero((of_elements == at) & sim.alive)
     held = gram[at]
-    ways = [f"in {axis}" for c, axis in enumerate("xyz"[:dim]) if held[c, c] <= 1e-12]
+    motions = [f"in {axis}" for c, axis in enumerate("xyz"[:dim]) if held[c, c] <= 1e-12]
     movements = vectors[bad[0]][:, loose[bad[0]]]
     if (np.abs(movements[dim:]) > 1e-6).any():
-        ways.append(f"about some {'point' if dim == 2 else 'axis'}" if not ways else "and turn")
-    words = " ".join(ways) or "along a line"
+        motions.append(f"about some {'point' if dim == 2 else 'axis'}" if not motions else "and turn")
+    words = " ".join(motions) or "along a line"
     others = f" (and {len(bad) - 1} more bodies)" if len(bad) > 1 else ""
     place = ", ".join(f"{c:g}" for c in centre[at])
     raise CommandError(
@@ -707,14 +708,14 @@ def _newton(
                 break
             factors += 1
         try:
-            way = solver.solve(force, left)
+            increment = solver.solve(force, left)
         except CommandError as singular:
             error = str(singular)
             break
         iterations += 1
         bold = elastic and tries > 0 and ratio > enough
         tries -= bold
-        found = _along(sim, nodes, unknowns, x, way, ratio, left > 0.0 or bold, enough, missing)
+        found = _along(sim, nodes, unknowns, x, increment, ratio, left > 0.0 or bold, enough, missing)
         if found is None:
             if ratio <= enough or (renew and (elastic or not tries)):
                 break  # as near as rounding allows, or never
@@ -753,18 +754,19 @@ def _along(
     nodes: Nodes,
     unknowns: Unknowns,
     x: np.ndarray,
-    way: np.ndarray,
+    increment: np.ndarray,
     ratio: float,
     bold: bool,
     enough: float,
     missing: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float, float] | None:
-    """The largest of the parts 1, 1/2, 1/4 ... of the way that brings forces nearer to balance, and what is there:
-    position, forces, ratio, sum of forces. bold: they may as well be farther from it, as while prescribed movements
-    are made."""
+    """Return the largest of the fractions 1, 1/2, 1/4 ... of the increment that reduces the unbalanced forces, and what
+    is there: position, forces, ratio, sum of forces. bold: they may as well be farther from it, as while prescribed
+    movements are made.
+    """
     part = 1.0
     for _ in range(HALVINGS):
-        trial = x + part * way
+        trial = x + part * increment
         force, after, total = unbalanced(sim, nodes, unknowns, trial, missing)
         if after < ratio or (bold and after < 1.0):
             return part, trial, force, after, total
@@ -841,9 +843,9 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[list[Pieces], int]:
         joint_points.stiffness(*joints, local.joint_table, local.joint_beyond, softening, made, left)
         state = joints.state[joints.slots]
         past += int(((left < 0.0) & (state <= BROKEN) & ~(softening & (state >= YIELDED))).sum())
-        ends, way = local.joint_ends(slots[which], of_sides=len(found) > 0)
-        if way is not None:
-            made = np.einsum("nai,nab,nbj->nij", way, made, way, optimize=True)
+        ends, basis = local.joint_ends(slots[which], of_sides=len(found) > 0)
+        if basis is not None:
+            made = np.einsum("nai,nab,nbj->nij", basis, made, basis, optimize=True)
         found.append(Pieces(local.slot_face[slots[which]], sim.node.reshape(-1)[ends], made))
     return found, past
 

@@ -48,14 +48,14 @@ class Pieces:
 
 @dataclass
 class Unknowns:
-    """Degrees of freedom of nodes. number (nn, dim): of the unknowns of a node along way[:, :, k], -1: none there;
+    """Degrees of freedom of nodes. number (nn, dim): of the unknowns of a node along basis[:, :, k], -1: none there;
     given (nn, dim) [m]: prescribed movement."""
 
     number: np.ndarray
-    way: np.ndarray
+    basis: np.ndarray
     given: np.ndarray
     oblique: np.ndarray
-    """(nn,) bool: nodes whose ways are not the axes."""
+    """(nn,) bool: nodes whose basis is not the axes."""
 
     @property
     def count(self) -> int:
@@ -63,7 +63,7 @@ class Unknowns:
 
     def reduced(self, force: np.ndarray) -> np.ndarray:
         """Forces (nn, dim) on nodes as right-hand side (n,)."""
-        along = np.einsum("nck,nc->nk", self.way, force)
+        along = np.einsum("nck,nc->nk", self.basis, force)
         out = np.empty(self.count)
         known = self.number >= 0
         out[self.number[known]] = along[known]
@@ -72,7 +72,7 @@ class Unknowns:
     def moved(self, q: np.ndarray, share: float) -> np.ndarray:
         """Movements (nn, dim) [m] from the unknowns, and this share of what is prescribed."""
         along = np.where(self.number >= 0, q[self.number], 0.0) if len(q) else np.zeros(self.number.shape)
-        out = np.where(self.oblique[:, None], np.einsum("nck,nk->nc", self.way, along), along)
+        out = np.where(self.oblique[:, None], np.einsum("nck,nk->nc", self.basis, along), along)
         return out + share * self.given
 
     def entries(self, pieces: list[Pieces]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -86,10 +86,10 @@ class Unknowns:
             turned = np.flatnonzero(self.oblique[one.node].any(axis=1))
             number = self.number[one.node].reshape(m, dim * k)
             if len(turned):
-                way = self.way[one.node[turned]]
-                half = np.einsum("mkca,mkcjd->mkajd", way, stiffness[turned])
+                basis = self.basis[one.node[turned]]
+                half = np.einsum("mkca,mkcjd->mkajd", basis, stiffness[turned])
                 stiffness = stiffness.copy()
-                stiffness[turned] = np.einsum("mkajd,mjdb->mkajb", half, way)
+                stiffness[turned] = np.einsum("mkajd,mjdb->mkajb", half, basis)
             if some_given:
                 # The columns of prescribed movements count along the axes; only the rows are turned.
                 untouched = one.stiffness.reshape(m, k, dim, k, dim).copy()

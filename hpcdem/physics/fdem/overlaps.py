@@ -70,7 +70,7 @@ def count(sim: State, local: Local) -> int:
     return len(_deep(sim, local))
 
 
-def tell(sim: State, local: Local) -> None:
+def report(sim: State, local: Local) -> None:
     """Say where bodies overlap too deep; PhysicsError if the run shall stop there. The model is closed. Collective."""
     found, o = _deep(sim, local), sim.options
     if not len(found):

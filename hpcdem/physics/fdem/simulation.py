@@ -48,7 +48,7 @@ from hpcdem.physics.fdem.pairs import cut_corner
 from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.state import NARROW, WIDE, ListState
 
-ROOM = 0.6
+MARGIN = 0.6
 """Largest sum of displacements of two elements before storage and ghosts are renewed; over the mean edge."""
 SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
@@ -230,7 +230,7 @@ class Blocks(Edited):
             guards.stop_on_runaway(self, bool(broken), bool(inverted))
         if due and deep > max(overlaps.DEEP, overlaps.AGAIN * rebuild_state.deep):
             rebuild_state.deep = deep
-            overlaps.tell(self, self.local)
+            overlaps.report(self, self.local)
         if slid > apart.FAR:
             apart.check(self, self.local, PhysicsError)
         self.local.tally[:, elements.NEW_YIELDED] = 0
@@ -240,7 +240,7 @@ class Blocks(Edited):
             margin = 0.5 * rebuild_state.skin - math.sqrt(path2)
             rebuild_state.late += margin < 0.0
             # Lists end where the ghosts do, so some of their room is left for the next ones.
-            outdated |= 0.5 * (ROOM - WIDE) * self.mean_edge < math.sqrt(way2) + stride
+            outdated |= 0.5 * (MARGIN - WIDE) * self.mean_edge < math.sqrt(way2) + stride
             stale |= margin < stride
             if stale or outdated:
                 margin = 0.5 * rebuild_state.skin
@@ -387,7 +387,7 @@ class Blocks(Edited):
         self._apart = self._linked = rebuild_state.side
         if not frozen:
             rebuild_state.skin = self._skin()
-            margin = ROOM * self.mean_edge if self.options.collision else 0.0
+            margin = MARGIN * self.mean_edge if self.options.collision else 0.0
             self._linked = max(self._longest, of_loads) * (1.0 + 1e-9)
             self._apart = max(margin * (1.0 + 1e-9), self._linked)
             needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + margin

@@ -27,7 +27,7 @@ from hpcdem.physics.field import assigned, elements, kernels
 from hpcdem.physics.field.conditions import Conditions
 from hpcdem.physics.field.elements import Conduction
 from hpcdem.physics.field.faces import FaceCondition
-from hpcdem.physics.field.model import LOOK, Tables
+from hpcdem.physics.field.model import CHECK_EVERY, Tables
 from hpcdem.physics.field.nodes import Nodes
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Diffusing(Conditions):
         self._stiffness_of: np.ndarray | None = None
         self._stiffness, self._wide = np.empty(0), np.empty(0, bool)
         self._found_for: tuple[float, ...] = ()
-        self._told = 0.0
+        self._logged_dt = 0.0
         self._warned_obtuse = False
         self._limit = math.inf
 
@@ -262,9 +262,9 @@ class Diffusing(Conditions):
 
     def _report_step(self) -> None:
         log = self.blocks.log
-        if log is None or not math.isfinite(self.dt) or abs(self.dt - self._told) <= 0.1 * self._told:
+        if log is None or not math.isfinite(self.dt) or abs(self.dt - self._logged_dt) <= 0.1 * self._logged_dt:
             return
-        self._told, shown = self.dt, partial(with_prefix, unit="s")
+        self._logged_dt, shown = self.dt, partial(with_prefix, unit="s")
         log.info(
             f"{self.name}: {counted(self.sub_steps, 'sub-step')} of {shown(self.dt)} in each cycle; the stability "
             f"limit is {shown(self._limit)}"
@@ -340,7 +340,7 @@ class Diffusing(Conditions):
             self.cycles += 1
             self._cycle_done()
             blocks.local.follow_heat()
-        if self.cycles % LOOK == 0:
+        if self.cycles % CHECK_EVERY == 0:
             self._check_finite()
 
     def _step_done(self) -> None:

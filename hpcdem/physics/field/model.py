@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MANY = 100_000
 """Sub-steps in a cycle that are too many to be meant."""
-LOOK = 100
+CHECK_EVERY = 100
 """Cycles after which a field is checked: whether it has blown up, and how long its sub-steps may be."""
 Tables = dict[str, dict[str, np.ndarray]]
 
@@ -206,7 +206,7 @@ class Field(SurfaceLoad):
 
     of_mesh: ClassVar[bool] = True
     own_clock: ClassVar[bool] = True
-    told: ClassVar[str] = ""
+    label: ClassVar[str] = ""
     """Name in messages, if it differs from the name of the field."""
     word: ClassVar[str]
     """Word of commands for its part of the calculation."""
@@ -244,7 +244,7 @@ class Field(SurfaceLoad):
             self.dt = period / self.sub_steps
         if not steps and self.sub_steps > MANY:
             raise CommandError(
-                f"{self.told or self.name} would need {self.sub_steps} sub-steps of {within:.3g} s in {instead}"
+                f"{self.label or self.name} would need {self.sub_steps} sub-steps of {within:.3g} s in {instead}"
             )
 
     def _unset(self, conditions: np.ndarray, numbers: np.ndarray | None) -> None:

@@ -197,7 +197,7 @@ class Channels(Travelling, FlowAssignments):
             self.removed[name] = self._sum(self.nodes[gone, column], self.removed[name])
 
     def _shrink(self) -> None:
-        """Room of the nodes after a change of channels: fluid that has no room any more is gone."""
+        """Update the volumes of the nodes after a change of channels; fluid of volume that disappears is removed."""
         before = self.nodes[:, kernels.V].copy()
         self._find_volumes()
         self.kept = np.ones(len(self.number))
@@ -213,7 +213,7 @@ class Channels(Travelling, FlowAssignments):
             self._find_state(slice(None))
 
     def _keep_pressures(self) -> None:
-        """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""
+        """Keep pressures and saturations: the fluid required is supplied, and fluid without volume is removed."""
         p, s = self.state[: self.owned, kernels.P], self.state[: self.owned, kernels.S]
         w = self.nodes[:, kernels.V] * (s + p / self.fluid("fluid_bulk"))
         self.nodes[:, kernels.GIVEN] += w - self.nodes[:, kernels.W]
@@ -237,7 +237,7 @@ class Channels(Travelling, FlowAssignments):
         if self.slurry is not None:
             self.slurry.thicken(self._ends, self.channel_table)
 
-    def find_rooms(self) -> None:
+    def update_volumes(self) -> None:
         """Room of nodes where the blocks are now. Not collective."""
         self.find_geometry()
         self._find_volumes()

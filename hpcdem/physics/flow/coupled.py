@@ -131,7 +131,7 @@ class Coupled(System):
         if not inside:
             flow.p0 = reference_pressure(flow, self._stress())
         self.fluid = Fluid(flow, flow.p0)
-        self.fluid.volume = self.fluid.rooms(self.fluid.table_at(self.x))
+        self.fluid.volume = self.fluid.volumes(self.fluid.table_at(self.x))
         self.solver = self._solver()
         self._stored = (0.0, 0.0)
         if not self.moves:

@@ -201,7 +201,7 @@ class Fluid:
             own[rows] = np.maximum(y - above, 0.0) if y > 0.0 else y
         return own
 
-    def rooms(self, table: np.ndarray) -> np.ndarray:
+    def volumes(self, table: np.ndarray) -> np.ndarray:
         """Volumes (n,) [m2] of the nodes, by the table of links."""
         return np.bincount(self.end, table[self.both, kernels.HALF], self.n)
 
@@ -253,7 +253,7 @@ class Fluid:
         kernels.flows(
             threads, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost
         )
-        volume = self.rooms(table)
+        volume = self.volumes(table)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
         into = np.bincount(self.end, self.side * q[self.both], self.n) * dt

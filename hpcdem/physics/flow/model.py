@@ -17,7 +17,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.units import counted, with_prefix
 from hpcdem.physics.field import assigned
-from hpcdem.physics.field.model import LOOK
+from hpcdem.physics.field.model import CHECK_EVERY
 from hpcdem.physics.flow import account, kernels
 from hpcdem.physics.flow.assignments import Condition
 from hpcdem.physics.flow.values import Values
@@ -41,7 +41,7 @@ class Flow(Values):
 
     name: ClassVar[str] = "fluid"
     kernel_kind: ClassVar[str] = "flow"
-    told: ClassVar[str] = "flow"
+    label: ClassVar[str] = "flow"
     word: ClassVar[str] = "hydraulic"
 
     def __init__(self, blocks: Blocks) -> None:
@@ -54,7 +54,7 @@ class Flow(Values):
         """Positions (nn, dim) of the nodes of the blocks at which these have eliminated the elements."""
         self._checked = False
         """The length of a sub-step that was set is one that can be."""
-        self._told: tuple[float, float] = (0.0, 0.0)
+        self._logged: tuple[float, float] = (0.0, 0.0)
 
     @property
     def stays(self) -> bool:
@@ -153,10 +153,10 @@ class Flow(Values):
 
     def _report_step(self, limit: float) -> None:
         log = self.blocks.log
-        known, before = self._told
+        known, before = self._logged
         if log is None or (abs(self.dt - known) <= 0.1 * known and abs(limit - before) <= 0.1 * before):
             return
-        self._told, shown = (self.dt, limit), partial(with_prefix, unit="s")
+        self._logged, shown = (self.dt, limit), partial(with_prefix, unit="s")
         log.info(
             f"flow: {counted(self.sub_steps, 'sub-step')} of {shown(self.dt)} in each cycle; the stability limit is "
             f"{shown(2.0 * limit)}, half of it {shown(limit)}"
@@ -219,11 +219,11 @@ class Flow(Values):
         self.waited = 0
         with blocks.timers("flow"):
             if o.mechanical:
-                self.find_rooms()
+                self.update_volumes()
                 if any(self._gravity()):
                     self._take_heights()
                     self._refresh()
-            if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given() or self._outrun()):
+            if o.mechanical and (self.cycles % CHECK_EVERY == 0 or self._found_for != self._given() or self._outrun()):
                 self._find_step()
             if self.carried is not None:
                 self.carried = np.zeros(len(self._ends))
@@ -233,7 +233,7 @@ class Flow(Values):
                 self._sub_step(condition)
             self.find_shore()
             self.cycles += 1
-        if self.cycles % LOOK == 0:
+        if self.cycles % CHECK_EVERY == 0:
             self._check(self.number[~np.isfinite(self.nodes[:, kernels.W])])
 
     def _sub_step(self, condition: np.ndarray) -> None:

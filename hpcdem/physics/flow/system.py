@@ -20,7 +20,7 @@ from hpcdem.physics.flow.tangent import Tangent
 AIM, ENOUGH = 1e-10, 1e-7
 """Residual of forces and fluid over their contributions: target, and limit if rounding allows no less."""
 MOST, HALVINGS = 25, 6
-"""Iterations of a step, and halvings of the way of one."""
+"""Largest number of iterations of a step, and of halvings of an increment."""
 
 
 @dataclass
@@ -103,8 +103,8 @@ class System:
         number = np.full((blocks + n, dim), -1, np.int64)
         number[:blocks] = of.number
         number[blocks:, 0] = of.count + np.arange(n)
-        way = np.concatenate([of.way, np.tile(np.eye(dim), (n, 1, 1))])
-        found = Unknowns(number, way, np.zeros((blocks + n, dim)), np.concatenate([of.oblique, np.zeros(n, bool)]))
+        basis = np.concatenate([of.basis, np.tile(np.eye(dim), (n, 1, 1))])
+        found = Unknowns(number, basis, np.zeros((blocks + n, dim)), np.concatenate([of.oblique, np.zeros(n, bool)]))
         self.count.unknowns = found.count
         return found
 
@@ -156,14 +156,14 @@ class System:
                 with timers.around("factors"):
                     self.solver.factor(pieces)
                 with timers.around("solve"):
-                    way = self.solver.solve(force, 0.0)
+                    increment = self.solver.solve(force, 0.0)
             except CommandError as singular:
                 error = str(singular)
                 break
             self.count.factors += 1
             iterations += 1
             part, best = 1.0, (math.inf, 1.0)
-            to_x, to_u = way[: len(x)], way[len(x) : len(x) + len(u), 0]
+            to_x, to_u = increment[: len(x)], increment[len(x) : len(x) + len(u), 0]
             for _ in range(HALVINGS):
                 trial = self._lacking(step, x + part * to_x, u + part * to_u)
                 if trial[0] < lack or (iterations == 1 and lack > ENOUGH and trial[0] < math.inf):

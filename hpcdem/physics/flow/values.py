@@ -57,7 +57,7 @@ class Values(Faces):
         "number"."""
         self.blocks.close_model()
         if self.frozen:
-            self.find_rooms()
+            self.update_volumes()
         if kind == FLOW_NODE:
             made = {
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],

@@ -165,16 +165,16 @@ class Heat(Diffusing):
 
     def find_contacts(self) -> None:
         """Find where faces touch now, for pairs with an element of this rank; the model is closed. Not collective."""
-        self._passes, room = self.passes, 0
+        self._passes, slots = self.passes, 0
         while True:
             ends = 2 * self.blocks.dim
-            self._touch = np.empty((room, ends), np.int64), np.empty((room, ends)), np.empty(room)
+            self._touch = np.empty((slots, ends), np.int64), np.empty((slots, ends)), np.empty(slots)
             if not self._passes or not len(self.blocks.local.pairs):
                 return
             found = (self._touching_in_space if self.blocks.dim == 3 else self._touching)()
-            if found == room:
+            if found == slots:
                 return
-            room = found
+            slots = found
 
     def _touching(self) -> int:
         """Fill what there is room for of places where faces touch; how many there are."""

@@ -18,7 +18,7 @@ from hpcdem.core.account import closed
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.field import assigned
-from hpcdem.physics.field.model import LOOK, MANY
+from hpcdem.physics.field.model import CHECK_EVERY, MANY
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import LINKS
@@ -66,7 +66,7 @@ class Proppant(ProppantAssignments):
         self._start_clock(flow.time)
         self.sub_steps = 1
         self._held: np.ndarray | None = None
-        self._refused = self._told = 0.0
+        self._refused = self._logged_speed = 0.0
         flow.slurry = self
         flow.carried = np.empty(0) if flow.carried is None else flow.carried
         flow.more["concentration"] = lambda: self.state[: len(self.number), kernels.C]
@@ -86,7 +86,7 @@ class Proppant(ProppantAssignments):
             )
         at = self._nodes(nodes)
         self.blocks.close_model()
-        self.take_rooms()
+        self.update_slurry()
         mine = np.isin(self.number, at)
         if concentration > 0.0 and not self.blocks.comm.any(bool((self.nodes[mine, kernels.ROOM] > 0.0).any())):
             raise CommandError("these flow nodes are dry: set flow-node initial pressure or saturation first")
@@ -207,14 +207,14 @@ class Proppant(ProppantAssignments):
         )
         self._refresh()
 
-    def take_rooms(self) -> None:
-        """Slurry of the nodes is as it is now, whatever commands have said. Not collective."""
-        room = self._find_rooms()
+    def update_slurry(self) -> None:
+        """Set the slurry of the nodes to its present volume after commands. Not collective."""
+        room = self._slurry_volumes()
         self.nodes[:, kernels.ROOM_BEFORE] = room
         self.given = self.flow.nodes[:, flowing.GIVEN].copy()
         self.time = self.flow.time
 
-    def _find_rooms(self) -> np.ndarray:
+    def _slurry_volumes(self) -> np.ndarray:
         """Update the volume of each node and its space for slurry, and return the latter."""
         volume = self.flow.nodes[:, flowing.V]
         self.nodes[:, kernels.VOLUME] = volume
@@ -224,7 +224,7 @@ class Proppant(ProppantAssignments):
     def filled(self) -> None:
         """A command has given fluid to nodes, or taken it; their proppant stays."""
         if self._held is self.flow.held:
-            self.take_rooms()
+            self.update_slurry()
             self._settle()
 
     def elements_removed(self, elements: np.ndarray) -> None:
@@ -244,8 +244,8 @@ class Proppant(ProppantAssignments):
         v, flow = self.speed(), self.flow
         size, density = self.values["proppant_size"], flow.fluid("fluid_density")
         found = settling.reynolds(v, size, density, flow.viscosity)
-        if self.blocks.log is not None and v != self._told:
-            self._told = v
+        if self.blocks.log is not None and v != self._logged_speed:
+            self._logged_speed = v
             stokes = self.values["proppant_stokes"] > 0.0
             law = "Stokes" if stokes else "Schiller and Naumann"
             self.blocks.log.info(f"proppant: a grain settles by {v:.4g} m/s after {law}, Reynolds number {found:.3g}")
@@ -259,8 +259,8 @@ class Proppant(ProppantAssignments):
 
     def follow(self) -> None:
         if self.flow.frozen and self.values["proppant_modulus"] > 0.0:  # packs give way
-            self.flow.find_rooms()
-            self._find_rooms()
+            self.flow.update_volumes()
+            self._slurry_volumes()
             self._settle()
         self.flowed()
 
@@ -270,7 +270,7 @@ class Proppant(ProppantAssignments):
         if not dt > 0.0:
             return
         if not self.on:
-            self.take_rooms()
+            self.update_slurry()
             return
         with self.blocks.timers("proppant"):
             self._advance(dt)
@@ -282,7 +282,7 @@ class Proppant(ProppantAssignments):
         """Advance by the time [s] for which the fluid has flowed."""
         flow, v, nodes, comm = self.flow, self.values, self.nodes, self.blocks.comm
         nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
-        self._find_rooms()
+        self._slurry_volumes()
         ends, begin, channel, side = flow.links
         assert flow.carried is not None
         q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
@@ -290,7 +290,7 @@ class Proppant(ProppantAssignments):
             q -= np.repeat(q.reshape(-1, links).mean(axis=1), links)
         self._find_falls()
         fall = self._falls
-        if flow.implicit or self.cycles % LOOK == 0:
+        if flow.implicit or self.cycles % CHECK_EVERY == 0:
             least = kernels.fastest(begin, channel, side, q, table, fall, speed, flow.nodes, nodes)
             least = float(comm.min_into(np.array([least]))[0])
             self.sub_steps = max(1, math.ceil(dt / (COURANT * least)))
@@ -356,7 +356,7 @@ class Proppant(ProppantAssignments):
     def _report_refused(self, refused: float) -> None:
         self._refused += refused
         log = self.blocks.log
-        if self.cycles % LOOK == LOOK - 1 or self.flow.implicit:
+        if self.cycles % CHECK_EVERY == CHECK_EVERY - 1 or self.flow.implicit:
             total = float(self.blocks.comm.sum_into(np.array([self._refused]))[0])
             self._refused = 0.0
             if total > 0.0 and log is not None:

@@ -85,7 +85,7 @@ class _Maps:
         left = LEFT + max(0.0, 0.5 * (plots.PAGE_WIDTH - LEFT - RIGHT - used))
         self.maps = [self._axes(left + k * (self.width + GAP), self.width) for k in range(number)]
         for k, ax in enumerate(self.maps):
-            blocks.frame(ax, seen, blocks.Looks(font=plots.FONT), first=k == 0, last=True)
+            blocks.frame(ax, seen, blocks.Appearance(font=plots.FONT), first=k == 0, last=True)
         self._right = left + number * self.width + (number - 1) * GAP
 
     def _axes(self, x: float, width: float, part: float = 1.0) -> Any:
@@ -130,7 +130,7 @@ def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> An
     timed = "break_time" in state.of_joints and bool((state.of_joints["state"] == blocks.BROKEN).any())
     sheet = _Maps(state, [4.6, 3.6], [GAP, LOWER_GAP + LEGEND], 2 if timed else 1)
     _crack_curves(sheet.panels, parts, events, "length")
-    sheet.legend(blocks.panel(sheet.maps[0], state, sheet.seen, sheet.width, blocks.Looks(font=plots.FONT)))
+    sheet.legend(blocks.panel(sheet.maps[0], state, sheet.seen, sheet.width, blocks.Appearance(font=plots.FONT)))
     if timed:
         _by_time(sheet, state)
     _letters([*sheet.panels, *sheet.maps])

@@ -12,7 +12,7 @@ from hpcdem.core.units import scale
 from hpcdem.io import colours
 from hpcdem.io.axes import CM, View, view
 from hpcdem.post import plots
-from hpcdem.post.layers import Look
+from hpcdem.post.layers import Appearance
 from hpcdem.post.measure import cracks
 from hpcdem.post.measure.fault_history import History
 from hpcdem.post.measure.grains import Grains
@@ -79,7 +79,7 @@ def section_height(seen: View, right: float = RIGHT) -> float:
 
 def draw_section(ax: Any, g: Grains, seen: View, palette: np.ndarray = colours.RGB, walls: int = 5) -> None:
     """Particles and walls (of this colour), axes in km."""
-    plots.draw_frame(g.drawn(walls), ax, seen, plots.MODEL, plots.Style(look=Look(palette)))
+    plots.draw_frame(g.drawn(walls), ax, seen, plots.MODEL, plots.Style(appearance=Appearance(palette)))
     ax.tick_params(labelsize=plots.FONT - 1.0)
 
 

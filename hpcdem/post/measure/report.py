@@ -26,7 +26,7 @@ from hpcdem.post.measure import walls as curves
 from hpcdem.post.measure.fault_history import History
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.kinds import Done, Sheet
-from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, SOLID_KINDS, Plan, Request, Scene, look, make_plan
+from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, SOLID_KINDS, Plan, Request, Scene, make_plan, read_grains
 
 _T = TypeVar("_T")
 
@@ -168,7 +168,7 @@ def _measure(comm: Comm, log: Any, plan: Plan, what: Sequence[str]) -> dict[str,
 
 
 def _read(file: FrameFile, plan: Plan, tables: tuple[str, ...]) -> Grains:
-    return look(file, plan.request, tables)
+    return read_grains(file, plan.request, tables)
 
 
 def _one_field(parts: list[dict[str, Any]]) -> None:

@@ -165,10 +165,10 @@ def _pusher(request: Request, frames: list[FrameFile]) -> tuple[int | None, np.n
             raise UsageError(f"--wall {wall}: unknown wall in {frames[0].path.name}; its walls: {ids}")
         return wall, none, frames
     moving = driving_wall(first, last)
-    end = look(frames[-1], request)
+    end = read_grains(frames[-1], request)
     if end.fixed.any():
         for k, file in enumerate(frames):
-            begin = look(file, request)
+            begin = read_grains(file, request)
             if not begin.fixed.any():
                 continue
             row = pushing_row(begin, end)
@@ -183,7 +183,7 @@ def _place(file: FrameFile, request: Request, wall: int | None, row: np.ndarray,
     """x [m] of the face of what pushes in a frame; NaN without it."""
     if wall is not None:
         return float(middle(walls_of(file.path), wall)[0]) + request.xmove
-    return face_of_row(look(file, request), row, forward) if len(row) else float("nan")
+    return face_of_row(read_grains(file, request), row, forward) if len(row) else float("nan")
 
 
 def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
@@ -191,7 +191,7 @@ def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
     groups: set[str] = set()
     colors: set[int] = set()
     for file in frames:
-        g = look(file, request)
+        g = read_grains(file, request)
         if request.chosen(g).any():
             return g.take(request.chosen(g))
         groups |= {*g.group.tolist()}
@@ -205,7 +205,7 @@ def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
     )
 
 
-def look(file: FrameFile, request: Request, tables: tuple[str, ...] = ()) -> Grains:
+def read_grains(file: FrameFile, request: Request, tables: tuple[str, ...] = ()) -> Grains:
     """A frame, moved as requested."""
     return grains(file.path, file.ini, tables).moved(request.xmove, request.ymove)
 

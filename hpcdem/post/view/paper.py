@@ -95,7 +95,7 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     page = left + width + right, bottom + height + top
     figure = Figure(figsize=(page[0] * CM, page[1] * CM))
     axes = figure.add_axes((left / page[0], bottom / page[1], width / page[0], height / page[1]))
-    blocks.frame(axes, seen, blocks.Looks(font=paper.font), first=True, last=True)
+    blocks.frame(axes, seen, blocks.Appearance(font=paper.font), first=True, last=True)
     if not view.axes or oblique:
         axes.set_axis_off()
     if shown.turn is not None:

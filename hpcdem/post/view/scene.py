@@ -160,20 +160,20 @@ def default_view(moment: Moment) -> ModelView:
     them."""
     shells = moment.dim == 3 and "liners" in moment.objects
     inside = shells or any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
-    looks: dict[str, dict[str, Any]] = {"faults": {"field": "fault"}}
+    appearance: dict[str, dict[str, Any]] = {"faults": {"field": "fault"}}
     if "elements" in moment.objects:
         field = telling(moment)
         small = moment.of("elements").count <= blocks.MOST_EDGES
-        looks["elements"] = {
+        appearance["elements"] = {
             "field": field, "edges": small and (not field or moment.dim == 3), "opacity": THROUGH if inside else 1.0
         }  # fmt: skip
     if "channels" in moment.objects and _varies(moment.of("channels"), "fluid_pressure"):
-        looks["channels"] = {"field": "fluid_pressure", "colours": "blue-red"}
+        appearance["channels"] = {"field": "fluid_pressure", "colours": "blue-red"}
     if shells and _varies(moment.of("liners"), "membrane_smallest"):
-        looks["liners"] = {"field": "membrane_smallest", "colours": "blue-red"}
+        appearance["liners"] = {"field": "membrane_smallest", "colours": "blue-red"}
     return ModelView(
         layers=tuple(
-            Layer(object=name, visible=name not in HIDDEN, **looks.get(name, {}))
+            Layer(object=name, visible=name not in HIDDEN, **appearance.get(name, {}))
             for name in OBJECTS if name in moment.objects
         )
     )  # fmt: skip
@@ -204,9 +204,10 @@ def _varies(objects: Objects, name: str) -> bool:
     return bool(len(values)) and float(values.min()) < float(values.max())
 
 
-def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
-    """The view with objects coloured by a field; on: which, else the first that have it. looks: further values of that
-    layer. HpcdemError that names the fields there are."""
+def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **appearance: Any) -> ModelView:
+    """Return the view with objects coloured by a field; on: kind of object (default: the first with this field).
+    appearance: further values of that layer. HpcdemError that names the fields there are.
+    """
     having = [
         layer for layer in view.layers
         if layer.object in moment.objects and moment.of(layer.object).has(name)
@@ -215,7 +216,7 @@ def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None
     filled = [layer for layer in having if moment.of(layer.object).filled(name)] or having
     for layer in filled:
         if on in (None, layer.object):
-            return view.with_layer(layer.label, field=name, visible=True, **looks)
+            return view.with_layer(layer.label, field=name, visible=True, **appearance)
     if on is not None:
         objects = moment.of(on)
         if not any(layer.object == on for layer in view.layers):
@@ -227,22 +228,23 @@ def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None
 
 
 def adjusted(
-    view: ModelView, moment: Moment, name: str | None, on: str | None, looks: Mapping[str, Any], **more: Any
+    view: ModelView, moment: Moment, name: str | None, on: str | None, appearance: Mapping[str, Any], **more: Any
 ) -> ModelView:
-    """The view with objects coloured by a field (`with_field`), or without a field with other looks of one kind of
-    object; more: values of the view. HpcdemError for what the frame or the view does not have."""
+    """Return the view with objects coloured by a field (`with_field`), or without a field with another appearance of
+    one kind of object; more: values of the view. HpcdemError for what the frame or the view does not have.
+    """
     if name is not None:
-        view = with_field(view, moment, name, on, **looks)
+        view = with_field(view, moment, name, on, **appearance)
     elif on is not None:
         moment.of(on)
         labels = [layer.label for layer in view.layers if layer.object == on]
         if not labels:
             raise HpcdemError(f"the view does not show {on}")
-        plain = {"field": ""} if looks.get("colour") else {}  # instead of the field of the default view
+        plain = {"field": ""} if appearance.get("colour") else {}  # instead of the field of the default view
         for label in labels:
-            view = view.with_layer(label, visible=True, **plain, **looks)
-    elif looks:
-        word = "range" if "limits" in looks else next(iter(looks))
+            view = view.with_layer(label, visible=True, **plain, **appearance)
+    elif appearance:
+        word = "range" if "limits" in appearance else next(iter(appearance))
         raise UsageError(f"{word} requires field or object")
     return view.changed(**more) if more else view
 

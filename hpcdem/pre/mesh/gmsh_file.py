@@ -31,7 +31,7 @@ TYPES = {number: (kind, points) for kind, of in _TYPES.items() for number, point
 """Kind and number of points by the number that Gmsh gives to a type of elements; corners precede the others."""
 READ = {"MeshFormat", "PhysicalNames", "Nodes", "ParametricNodes", "Elements", "Entities", "PartitionedEntities"}
 PASSED_OVER = {"Comments"}
-LOOK = 4096
+LINES_AT_ONCE = 4096
 """Lines that are read at once."""
 
 
@@ -288,7 +288,7 @@ class _Reader:
         kind, n_tags = given.ints(3)[1:].tolist()
         given.at -= 3
         width = 3 + n_tags + self._type(kind)[1]
-        most = min(most, LOOK, (len(given.values) - given.at) // width)
+        most = min(most, LINES_AT_ONCE, (len(given.values) - given.at) // width)
         table = given.ints(max(most, 1) * width).reshape(-1, width)
         other = np.flatnonzero((table[:, 1] != kind) | (table[:, 2] != n_tags))
         k = int(other[0]) if len(other) else len(table)

@@ -65,7 +65,7 @@ Found = list[tuple[int, bool, Finding]]
 finding."""
 
 
-def look(machine: Machine, at_start: bool = False) -> Found:
+def inspect(machine: Machine, at_start: bool = False) -> Found:
     """Run the checks of this rank. A check that fails is a finding of the doctor and is ignored at the start of a
     run."""
     found: Found = []
@@ -101,7 +101,7 @@ def merged(of_ranks: Sequence[Found], hosts: Sequence[str]) -> list[Finding]:
 
 def start_warnings(machine: Machine, comm: Comm) -> list[str]:
     """Collective: what the log of a run says at its start, on rank 0; empty elsewhere and where all is well."""
-    of_ranks = comm.gather(look(machine, at_start=True))
+    of_ranks = comm.gather(inspect(machine, at_start=True))
     return [finding.line() for finding in merged(of_ranks or [], [p.host for p in machine.places])]
 
 
@@ -113,7 +113,7 @@ def examine(machine: Machine, comm: Comm) -> list[Finding]:
             machine.token.touch()
     patient_barrier(comm)
     machine.clocks = comm.allgather(time.time())
-    found = look(machine)
+    found = inspect(machine)
     patient_barrier(comm)
     with suppress(OSError):
         if comm.rank == 0:

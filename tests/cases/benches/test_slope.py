@@ -47,7 +47,7 @@ def test_finer_meshes_and_quads_agree(resident, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_strong_jointed_slope_stands(resident, tmp_path):
+def test_a_strong_jointed_slope_is_stable(resident, tmp_path):
     """Two benches of 2.5 m at 90 degrees; height of a vertical cut that stands by itself: about 4 c tan(45 + phi/2) /
     (rho g) (Terzaghi), 16.9 m for 60 kPa and 30 degrees."""
     common = {

@@ -47,14 +47,14 @@ def test_bending_stiffness_and_the_angle_at_which_it_breaks(tmp_path, disk, gap)
     assert limit == pytest.approx(0.01 if gap == 0.0 else 0.006)
     turn(sim, 0.9 * limit)
     torque = E * inertia / length * 0.9 * limit
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     tension = 0.5 * E * area / length * gap**2
     assert force(sim, 0)[2] == pytest.approx(-torque) and force(sim, 1)[2] == pytest.approx(torque)
     assert seen.elastic_bonds == pytest.approx(0.5 * torque * 0.9 * limit + tension) and sim.broken() == (0, 0)
     turn(sim, 0.098 * limit, 98)
     assert sim.broken() == (0, 0)
     turn(sim, 0.004 * limit, 4)
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert sim.broken() == (1, 0) and sim.bonds_left() == 0 and not force(sim, 0)[2]
     stored = 0.5 * E * inertia / length * limit**2 + tension
     assert seen.loss_bonds == pytest.approx(stored, rel=5e-3)
@@ -71,7 +71,7 @@ def test_unlike_radii_and_other_ways_to_break(tmp_path):
     assert force(sim, 1)[2] - shear * 1.0 == pytest.approx(E * inertia / 1.5 * 0.01, rel=1e-6)
     bonds.break_bonds(sim)
     turn(sim, 0.0, 2)
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert not force(sim, 0).any() and seen.elastic_bonds == 0.0 and abs(seen.relative) < 1e-9
 
 
@@ -134,7 +134,7 @@ def test_a_half_turn_of_the_whole_keeps_the_torques(tmp_path, bond):
     cycles.cycle(sim, 1)
     assert sim.particles["gid"].tolist() == order[::-1]
     assert (force(sim, 0)[2], force(sim, 1)[2]) == pytest.approx(before)
-    assert abs(sim.energy.look(sim).relative) < 1e-9
+    assert abs(sim.energy.evaluate(sim).relative) < 1e-9
 
 
 def test_refusals(tmp_path):

@@ -53,7 +53,7 @@ def test_the_budget_closes(tmp_path):
     cycles.cycle(sim, 3000)
     particles.delete(sim, Interval("x", 200.0, 300.0))
     cycles.cycle(sim, 3000)
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     absent = (
         "box",
         "work_blocks",
@@ -77,7 +77,7 @@ def test_an_elastic_heap_keeps_its_energy(tmp_path):
         sim = heap(tmp_path / f"{dt:g}", dt, 0.0, fric=0.0, energy=10**6)
         properties.prop(sim, damp=0.0)
         cycles.cycle(sim, round(4.0 / dt))
-        seen = sim.energy.look(sim)
+        seen = sim.energy.evaluate(sim)
         assert len(diagnostics.contact_rows(sim)[0]) + len(diagnostics.wall_rows(sim)[0]) > 5
         assert seen.loss_friction == seen.loss_local_damping == 0.0 and seen.work_gravity > 1e6
         errors.append(abs(seen.relative))
@@ -174,7 +174,7 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
 
 
 @pytest.mark.slow
-def test_same_bits_on_threads_and_when_looked_at(tmp_path):
+def test_same_bits_on_threads_and_when_inspected(tmp_path):
     one, three = heap(tmp_path / "1", seconds=2.0), heap(tmp_path / "3", seconds=2.0, threads=3)
     assert diagnostics.fingerprint(one) == diagnostics.fingerprint(three)
     assert diagnostics.highest_frequency(one) == diagnostics.highest_frequency(three)

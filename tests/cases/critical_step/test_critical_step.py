@@ -183,7 +183,7 @@ def test_the_limit_of_contacts_that_form_is_watched(tmp_path):
 
 
 @pytest.mark.parametrize("shear", [False, True])
-def test_bonds_count_in_frac_and_in_what_is_said(tmp_path, shear):
+def test_bonds_count_in_frac_and_in_what_is_reported(tmp_path, shear):
     """Bonds much stiffer than their contacts, which touch when the step is chosen: the step is theirs, and the chain
     stays; the step of the contacts is told to be too large."""
     sim = chain(tmp_path, 5)
@@ -223,7 +223,7 @@ def test_what_the_log_says(tmp_path):
     )
 
 
-def test_the_share_is_told_again_only_where_it_has_grown(tmp_path):
+def test_the_share_is_reported_again_only_where_it_has_grown(tmp_path):
     sim = chain(tmp_path, 5)
     sim.settings.dt = 0.6 * 2.0 / diagnostics.highest_frequency(sim)
     sim.log = Log(stream=io.StringIO())

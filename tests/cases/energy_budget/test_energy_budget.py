@@ -23,7 +23,7 @@ R = 1.0
 
 
 def budget(sim) -> Energy:
-    return sim.energy.look(sim)
+    return sim.energy.evaluate(sim)
 
 
 def one_ball(folder, dt: float, hertz: bool = False, **options):
@@ -302,7 +302,7 @@ def test_conserving_bonds_make_no_energy(tmp_path, hertz, kind):
         assert grown == pytest.approx(1.0, abs=1e-4) and "shear stiffness" not in said
 
 
-def test_damped_bonds_of_two_stiffnesses_are_told_of(tmp_path):
+def test_damped_bonds_of_two_stiffnesses_are_reported(tmp_path):
     said = cluster(tmp_path, True, "elastic", damp=0.3)[2]
     assert "the shear stiffness of 9 bonds changes" in said and "warning" not in said and "dissipates" in said
 

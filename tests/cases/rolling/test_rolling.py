@@ -114,7 +114,7 @@ def test_the_energy_budget_closes(tmp_path, kind):
     """Linear springs: to rounding but for the turning of normals, as without rolling."""
     sim = bed(tmp_path, kind)
     cycles.cycle(sim, 6000)
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert abs(seen.relative) < 2e-4
     assert seen.loss_rolling > 0.02 * seen.work_gravity
     assert (seen.elastic_rolling > 0.0) == (kind == "c")
@@ -132,18 +132,18 @@ def test_what_the_spring_of_a_pair_stores_and_loses(tmp_path):
     kr, limit = 3.0 * 5e5 * (0.2 * 2.0 / 3.0) ** 2, 0.2 * 2.0 / 3.0 * 5e5 * 0.1
     assert (kr, limit) == pytest.approx((26666.667, 6666.667))
     cycles.cycle(sim, 400)  # 0.1 rad: below the limit, at 0.25 rad
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     torque = kr * 0.1
     assert force(sim, 0)[2] == pytest.approx(-torque) and force(sim, 1)[2] == pytest.approx(torque)
     assert seen.elastic_rolling == pytest.approx(0.5 * kr * 0.1**2) and abs(seen.loss_rolling) < 1e-9 * kr
     cycles.cycle(sim, 1600)  # 0.5 rad: 0.25 of slipping
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert force(sim, 0)[2] == pytest.approx(-limit)
     assert seen.elastic_rolling == pytest.approx(0.5 * limit**2 / kr)
     assert seen.loss_rolling == pytest.approx(limit * 0.25, rel=1e-3) and abs(seen.relative) < 1e-12
     properties.prop(sim, Ids(0, 0), spin=0.0, xv=-10.0)
     cycles.cycle(sim, 20)  # they part
-    seen = sim.energy.look(sim)
+    seen = sim.energy.evaluate(sim)
     assert seen.elastic_rolling == 0.0 and not force(sim, 0).any() and abs(seen.relative) < 1e-9
 
 

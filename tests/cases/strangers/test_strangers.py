@@ -83,7 +83,7 @@ def test_the_damping_of_contacts_ends_at_its_tension(run: Run) -> None:
     assert [stress / tension for stress, tension in zip(found[::2], found[1::2])] == pytest.approx([1.0] * 3, rel=0.03)
 
 
-def test_tables_go_on_in_static_runs(run: Run) -> None:
+def test_tables_continue_in_static_runs(run: Run) -> None:
     assert numbers(run("static_tables.sc"), "syy %f time") == pytest.approx([-1e5], rel=1e-3)
 
 
@@ -128,7 +128,7 @@ def test_checkpoints_change_nothing(run: Run, tmp_path: Path) -> None:
     assert frames["off"] == frames["0.02"]
 
 
-def test_a_block_that_falls_through_another_is_told(run: Run) -> None:
+def test_a_block_that_falls_through_another_is_reported(run: Run) -> None:
     said = [line for line in warnings(run("low_penalty.sc")) if "overlap" in line or "penetrat" in line]
     assert said and re.search(r"\(-?[0-9.]+, ?-?[0-9.]+\)", said[0]), said
 
@@ -166,7 +166,7 @@ def test_sets_of_sets_and_of_solids(
     assert [f"{group} {members}" in text for group, members in groups.items()] == [True] * len(groups), text
 
 
-def test_a_mesh_in_pieces_is_told(run: Run) -> None:
+def test_a_mesh_in_pieces_is_reported(run: Run) -> None:
     """The whole one holds its load; of others the places are named, and the command that joins them."""
     text = run("mesh/pull_cube.sc")
     assert numbers(text, "good2 top %f elastic") == pytest.approx([1.03e-3], rel=0.02)
@@ -177,17 +177,17 @@ def test_a_mesh_in_pieces_is_told(run: Run) -> None:
 # -- discs -------------------------------------------------------------------------------------------------------------
 
 
-def test_bonds_that_make_energy_are_told(run: Run) -> None:
+def test_bonds_that_make_energy_are_reported(run: Run) -> None:
     text = run("bonds_make_energy.py", few=", (5e8, 0.01)) => )")
     assert [line for line in warnings(text) if "bond" in line and "energy" in line], text
 
 
-def test_a_time_step_beyond_the_limit_is_told_while_contacts_form(run: Run) -> None:
+def test_a_time_step_beyond_the_limit_is_reported_while_contacts_form(run: Run) -> None:
     text = run("time_step_unwatched.py", few="CYC 4000 => CYC 2000")
     assert [line for line in warnings(text) if "time step" in line], text
 
 
-def test_friction_goes_on_where_walls_meet(run: Run) -> None:
+def test_friction_continues_where_walls_meet(run: Run) -> None:
     text = run(
         "wall_junction.py", few="(1, 2, 4, 7, 20) => (1, 2)", near="s2.ball(-0.5, => s2.ball(-0.01,",
         short="s2.cycle(300_000) => s2.cycle(5000)", rest="s.cycle(20000) => s.cycle(6000)",

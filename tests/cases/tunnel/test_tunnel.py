@@ -65,7 +65,7 @@ def test_stress_around_the_tunnel(resident, tmp_path, elements):
 
 
 @pytest.mark.slow
-def test_a_horseshoe_gives_way_most_in_its_level_floor(resident, tmp_path):
+def test_a_horseshoe_yields_most_in_its_level_floor(resident, tmp_path):
     done = results(resident, tmp_path, Tunnel(shape="horseshoe", size=0.4))
     assert done.floor > 1.1 * done.crown > 0.0
     assert done.left == pytest.approx(done.right, rel=0.05) and done.left > 0.0

@@ -35,7 +35,7 @@ def stems(*steps: int, ini: tuple[int, ...] = (), suffix: str = ".dat") -> list[
     return sorted([f"all_{s:010d}{suffix}" for s in steps] + [f"all_{s:010d}_ini{suffix}" for s in ini])
 
 
-def test_v24_a_wall_goes_3000_m(tmp_path):
+def test_v24_a_wall_moves_3000_m(tmp_path):
     sim = flight(tmp_path)
     cycles.imple(sim, 4, xmove=3000.0, print=1000.0)
     assert sim.clock.step == 30000 and sim.clock.time == pytest.approx(1500.0, rel=1e-12)
@@ -54,7 +54,7 @@ def test_v24_a_wall_goes_3000_m(tmp_path):
             assert frame.walls["p1"][0] == pytest.approx([2.0 * t, 0.0], abs=1e-6)
 
 
-def test_way_of_a_wall_counts_from_the_start_of_the_command(tmp_path):
+def test_displacement_of_a_wall_counts_from_the_start_of_the_command(tmp_path):
     """CYC 7 printing every 5 steps, then IMPLE over 3 m (30 steps) printing and saving every metre."""
     sim = flight(tmp_path)
     settings.set_option(sim, "print", 5)
@@ -98,7 +98,7 @@ def test_the_number_of_steps_is_the_nearest_one(tmp_path, way, steps):
     assert sim.clock.step == steps
 
 
-def test_the_way_is_taken_as_positive(tmp_path):
+def test_the_displacement_is_taken_as_positive(tmp_path):
     """Also up and down, and against the sign of the velocity."""
     sim = flight(tmp_path)
     cycles.imple(sim, 4, xmove=-1.0)
@@ -108,7 +108,7 @@ def test_the_way_is_taken_as_positive(tmp_path):
     assert sim.clock.step == 20 and sim.walls.p2[0] == pytest.approx([1.0, 98.0])
 
 
-def test_a_wall_that_stands_is_an_error(tmp_path):
+def test_a_wall_at_rest_is_an_error(tmp_path):
     sim = flight(tmp_path)
     with pytest.raises(CommandError, match="wall 4 does not move"):
         cycles.imple(sim, 4, ymove=1.0)
