@@ -35,6 +35,7 @@ def test_shortened(resident, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.figures
 def test_the_figure(tmp_path):
     """Whole: the boulder comes to lie in the sand, in pieces; the figure of the gallery is drawn of it."""

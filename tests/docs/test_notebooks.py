@@ -38,6 +38,7 @@ def test_each_has_a_shorter_form() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SHORTER)
 def test_shortened_notebook_runs_to_its_end(name: str, tmp_path: Path) -> None:
     book = notebooks.carried_out(name, tmp_path, **SHORTER[name])
@@ -48,6 +49,7 @@ def test_shortened_notebook_runs_to_its_end(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_whole_ucs_says_its_strength(tmp_path: Path) -> None:
     found = re.search(
         r"strength (\S+) MPa, after Mohr and Coulomb (\S+) MPa", said(notebooks.carried_out("ucs", tmp_path))

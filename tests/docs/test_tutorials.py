@@ -101,6 +101,7 @@ def test_tutorial(page: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("page", [page for page, changes in SHORTER.items() if changes])
 def test_whole_tutorial(page: str, tmp_path: Path) -> None:
     done(page, tmp_path, {})

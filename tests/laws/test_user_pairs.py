@@ -95,14 +95,13 @@ def bits(sim):
     return sim.particles.hot[sim.particles.n_left :][: len(order)][order][:, :6].tobytes()
 
 
-@pytest.mark.parametrize("threads", [1, pytest.param(3, marks=pytest.mark.slow)])
-def test_two_laws_with_the_arithmetic_of_the_built_in_one_have_its_bits(tmp_path, threads):
+def test_two_laws_with_the_arithmetic_of_the_built_in_one_have_its_bits(tmp_path):
     """Of two files, and where they meet the built-in one, or one of them."""
     shutil.copy(HERE / "pairs.py", tmp_path / "own.py")
     plain = heap(tmp_path)
     support.steps(plain, 200)
     for meet in ("linear", LINEAR):
-        sim = heap(tmp_path, threads)
+        sim = heap(tmp_path)
         properties.prop(sim, law="own.py:linear", folder=tmp_path)
         properties.prop(sim, Group("one"), law=LINEAR, folder=HERE)
         properties.prop(sim, law=meet, between=(LINEAR, "own.py:linear"), folder=HERE)

@@ -181,6 +181,7 @@ def test_names_of_the_short_run(on_one_rank: Callable[[str], Path], suffix: str)
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_names_of_the_whole_run(resident: Resident, manual_scripts: Path, tmp_path: Path) -> None:
     run_script(resident, manual_scripts / "push_add_del.py", tmp_path / "whole", None, 2)

@@ -95,6 +95,7 @@ def packages(tmp_path_factory):
     return sdist, wheel
 
 
+@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_wheel_holds_the_package(packages):
     there = {str(path.relative_to(ROOT)) for path in (ROOT / "hpcdem").rglob("*")
@@ -104,6 +105,7 @@ def test_the_wheel_holds_the_package(packages):
     assert names == there
 
 
+@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_wheel_is_installed_into_a_fresh_environment(packages, tmp_path):
     """Its programs start there, with the numpy and MPI of this environment."""

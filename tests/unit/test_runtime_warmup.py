@@ -222,7 +222,8 @@ for kind in sys.argv[1:]:
 """
 
 
-@pytest.mark.nightly  # minutes of compiling
+@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "kinds", [("shared", "", *OF_PARTICLES, "blocks", "coupled"), ("shared", "blocks", *OF_BLOCKS)]
 )

@@ -14,6 +14,7 @@ from tests.conftest import ROOT, Launcher, absent
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_disc_splits(launch: Launcher, tmp_path: Path) -> None:
     """It bears more than the strength of its joints, and less than twice that; then it falls to a tenth. Cracks are
     opened ones, most of them along the plane of the loads, and the halves move apart."""

@@ -40,6 +40,7 @@ def test_push_with_fewer_steps_runs_to_its_figure(resident: Resident, tmp_path: 
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_whole_push_makes_thrust_sheets(resident: Resident, tmp_path: Path) -> None:
     """The figure of the README: the wedge at the wall is clearly thicker than the bed in front, and nothing was

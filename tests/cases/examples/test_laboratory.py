@@ -135,6 +135,7 @@ def test_short_angle_of_repose_collapses(launch: Launcher, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_whole_biaxial_gives_a_rock(launch: Launcher, tmp_path: Path) -> None:
     """The head claims about 16 degrees and 11 MPa; peaks grow with the confining stress."""
     done = launch(1, "--outdir", tmp_path, EXAMPLES / "biaxial.py", timeout=600)
@@ -147,6 +148,7 @@ def test_whole_biaxial_gives_a_rock(launch: Launcher, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_whole_triangles_are_stronger(launch: Launcher, tmp_path: Path) -> None:
     """The head claims that triangles are stronger and swell more."""
     done = launch(1, "--outdir", tmp_path, EXAMPLES / "biaxial_triangles.py", timeout=1800)
@@ -161,6 +163,7 @@ def test_whole_triangles_are_stronger(launch: Launcher, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_whole_angle_of_repose(launch: Launcher, tmp_path: Path) -> None:
     """The head claims 41 degrees; the slope hardly changes any more when the wall stops."""
     done = launch(1, "--outdir", tmp_path, EXAMPLES / "angle_of_repose.py", timeout=600)

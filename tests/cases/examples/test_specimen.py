@@ -41,6 +41,7 @@ def test_shortened_example_runs_to_its_figure(resident: Resident, tmp_path: Path
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_whole(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "specimen.sc").write_text(TEXT)
     done = resident(1, "specimen.sc", cwd=tmp_path, timeout=3600)

@@ -293,6 +293,7 @@ def foreland(run: Run) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", NAMES)
 def test_whole_example_makes_its_structure(resident: Resident, tmp_path: Path, name: str) -> None:

@@ -12,6 +12,7 @@ from tests.conftest import ROOT, Launcher, absent
 
 
 @pytest.mark.slow  # quick: tests/space, and --check of the script
+@pytest.mark.nightly
 def test_closure_of_a_tunnel(launch: Launcher, tmp_path: Path) -> None:
     """Far behind the face (1 + nu) p r / E = 3.75 mm, less what the held sides keep back (1 %, with R = 10 r) and
     constant strains are too stiff; at the face 0.25 (Panet 1995) to 0.29 of it (Vlachopoulos & Diederichs 2009)."""

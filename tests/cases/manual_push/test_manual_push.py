@@ -18,6 +18,7 @@ from tests.conftest import Launcher
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.mpi
 def test_whole_push_of_the_manual(launch: Launcher, manual_scripts: Path, tmp_path: Path) -> None:
     shutil.copy(manual_scripts / "push.py", tmp_path)
