@@ -216,7 +216,7 @@ def test_sections_and_pages_of_the_run_before_are_left_out(folder: Path) -> None
     say(zdemss, "zdemss", folder, "--format", "jpg", "--width", "6", "--max_workers", "1", "-d")
     record.write_text(text)
     log = say(zdemss, "zdemss", folder, "--format", "jpg", "--width", "6", "--max_workers", "1", "-d")
-    assert "of 5 sections 2 are left out" in log and "3 sections of" in log
+    assert "2 of 5 sections are ignored" in log and "3 sections of" in log
     log = say(movie, "movie", folder, "--format", "gif", "--size", "100", "--from", "ss")
     assert "2 frames of steps 3000 to 4000" in log and "movie.gif: 3 frames" in log
     os.utime(folder / f"{all_(1000)}.vtkhdf")
