@@ -10,7 +10,7 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
 from hpcdem.core.errors import EXIT_OK, UsageError
-from hpcdem.runtime import launch, run_folder
+from hpcdem.runtime import kept, launch, run_folder
 
 if TYPE_CHECKING:
     from hpcdem.page.desk import Desk
@@ -59,6 +59,7 @@ def start(words: list[str]) -> NoReturn:
     with messages_only():
         if launch.speaks_for_all():
             launch.prepare_environment(1)
+            kept.install()
             from hpcdem.page.viewer import serve
 
             paths, desk = [*options["paths"]], desk_of(options)

@@ -59,6 +59,9 @@ def main() -> None:
 
 def warm_up() -> None:
     """Compile or load every kernel, and import every module, that a specimen of the page needs."""
+    from hpcdem.runtime import kept
+
+    kept.install()
     from hpcdem.pre.specimen import PLACEMENTS, SHAPES, Request, make_specimen
 
     for shape in SHAPES:

@@ -139,10 +139,8 @@ def test_particles(late, tmp_path: Path, ranks: int) -> None:
 @pytest.mark.parametrize(
     ("ranks", "first"),
     [
-        pytest.param(1, "particles", marks=SLOW),
         (1, "blocks"),
         pytest.param(2, "particles", marks=[MPI, SLOW]),
-        pytest.param(2, "blocks", marks=[MPI, SLOW]),
     ],
 )
 def test_blocks_and_particles_in_any_order(late, tmp_path: Path, ranks: int, first: str) -> None:
@@ -165,8 +163,7 @@ def test_a_script_of_both_that_continues(launch: Launcher, tmp_path: Path, ranks
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=MPI)])
+@pytest.mark.parametrize(("ranks", "threads"), [(1, 2), pytest.param(2, 1, marks=MPI)])
 def test_a_bar_that_breaks(late, tmp_path: Path, ranks: int, threads: int) -> None:
     for name in ("bar.sc", "loop.sc"):
         assert late(ranks, SCRIPTS / name, "-j", threads, "--outdir", tmp_path / name[:3]) == [NOTHING] * ranks

@@ -102,7 +102,9 @@ import numpy as np
 from bench.block_memory import KINDS, listed
 from hpcdem import session
 from hpcdem.physics.fdem import changes
+from hpcdem.runtime import kept
 
+kept.install()
 of_process = session.current(1)
 comm, project = of_process.comm, of_process.project()
 for kind, dim in (("triangles", 2), ("jointed-tetrahedra", 3)):

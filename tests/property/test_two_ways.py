@@ -19,7 +19,7 @@ from tests.property.two_ways import BLOCKS, COUPLED, KINDS, PARTICLES, WAYS, Uni
 
 QUICK = {BLOCKS: (3, 5, 8, 16, 19, 20, 29), PARTICLES: (1, 3, 7, 8, 11), COUPLED: (1, 3, 4, 11, 12, 14, 15)}
 """Seeds that have all ways and all that may happen between them, among the first of MANY."""
-MANY = {BLOCKS: 40, PARTICLES: 12, COUPLED: 16}
+MANY = {BLOCKS: 30, PARTICLES: 12, COUPLED: 16}
 SLOW = int(os.environ.get("HPCDEM_PROPERTY_EXAMPLES", "100"))
 REGRESSIONS = [
     # A material that is new between two searches for contacts between discs and faces.

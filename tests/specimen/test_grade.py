@@ -230,6 +230,7 @@ def test_usage_error_is_one(curve: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.figures
 def test_example(tmp_path: Path) -> None:
     """examples/specimens.py with fewer grains: the three figures of docs/specimens.md, and the void ratio it claims."""

@@ -86,7 +86,9 @@ from mpi4py import MPI
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import MpiComm
 from hpcdem.io.slabs import find_rows, to_slabs
+from hpcdem.runtime import kept
 
+kept.install()
 comm = MpiComm(MPI.COMM_WORLD)
 for case, n in enumerate([0, 1, 2, 7, 1000, 20000]):
     rng = np.random.default_rng(case)
