@@ -27,6 +27,8 @@ FOUND = {
     (45.0, 2e6, 0.6): "opens", (30.0, 2e6, 0.6): "opens",
 }  # fmt: skip
 """Angle [degrees], stress along the fracture [Pa], friction of the joint: what happens."""
+BEYOND = {(90.0, 12e6, 0.6), (75.0, 12e6, 0.6), (60.0, 12e6, 0.9), (30.0, 2e6, 0.6)}
+"""What follows from others, which lie nearer to the criteria; for the figure."""
 SCRIPT = """
 import math
 at, reach, side, size, far, penalty, energy, strength = 0.4, 0.8, 0.4, 0.02, 6.0, 3e12, 100.0, STRENGTH
@@ -106,7 +108,7 @@ def test_the_criteria() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("angle", "high", "friction"), FOUND)
+@pytest.mark.parametrize(("angle", "high", "friction"), [one for one in FOUND if one not in BEYOND])
 def test_it_crosses_stops_or_opens_the_joint(tmp_path, angle, high, friction) -> None:
     """The stress across the fracture is 1 MPa. Where all criteria agree it is as they say, and within 5 % of them."""
     try:

@@ -316,6 +316,7 @@ def test_a_range_takes_particles_by_their_place_between_the_sides(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_example_flows_as_its_caption_says(launch: Launcher, tmp_path):
     launch(2, "--outdir", tmp_path, ROOT / "examples" / "chute.py")
     columns = []
