@@ -70,7 +70,8 @@ def made(source: Path, twins: int, out: Path) -> np.ndarray:
 
 
 def measured(folder: Path) -> np.ndarray:
-    """(10, 3): values of NAMES in the frames of a run, without the rows of particles that are walls."""
+    """(10, 3): values of NAMES in the frames of a run, of the particles above the floor and in front of the right wall:
+    without the rows of particles that are walls, and without a few that have slipped through them."""
     found = np.full((len(KM), 3), np.nan)
     for file in list_frames(folder):
         km = file.step // STEPS
@@ -78,9 +79,10 @@ def measured(folder: Path) -> np.ndarray:
             continue
         frame = read_frame(file.path)
         p = frame.tables["particles"].columns
-        rows = [k for k, name in enumerate(frame.group_names) if name.lower().endswith("_wall")]
-        rock = ~np.isin(p["group"], rows)
-        shape = wedge(*surface(np.asarray(p["x"])[rock], np.asarray(p["y"])[rock], COLUMN))
+        x, y, group = (np.asarray(p[name]) for name in ("x", "y", "group"))
+        rows = {name.lower(): k for k, name in enumerate(frame.group_names) if name.lower().endswith("_wall")}
+        rock = ~np.isin(group, list(rows.values())) & (y > BASE) & (x < x[group == rows["rig_wall"]].min())
+        shape = wedge(*surface(x[rock], y[rock], COLUMN))
         found[km - 1] = (shape.crest[1] - BASE) / 1e3, shape.toe[0] / 1e3, shape.slope
     return found
 
