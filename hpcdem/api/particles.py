@@ -15,7 +15,7 @@ class ParticleCommands:
 
     box = Function("walls.box")
     wall = Function("walls.wall", "id nodes")
-    periodic = Function("walls.periodic", "x")
+    periodic = Function("walls.periodic", "x xv")
     ball = Function("particles.ball", "x y rad id? color group")
     gen = Function("particles.gen")
     gen_grid = Function("particles.gen_grid")

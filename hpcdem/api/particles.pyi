@@ -54,15 +54,23 @@ class ParticleCommands:
         xv, yv : velocity [m/s]; it holds until it is changed.
         delete : bool: remove the wall with its contacts; accepts only id.
         """
-    def periodic(self, x: tuple[float, float]) -> None:
-        """PERIODIC: make x = left and x = right periodic boundaries: particles that leave through one enter through the
-        other, and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its
-        left
-        and right walls.
+    def periodic(self, x: tuple[float, float] | None = None, xv: float | None = None) -> None:
+        """PERIODIC: make x = left and x = right periodic sides: particles that leave through one enter through the
+        other,
+        and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its left
+        and
+        right walls. The right side can move.
 
         Parameters
         ----------
-        x : coordinates of the boundaries, (left, right) [m] (default: those of BOX).
+        x : coordinates of the sides, (left, right) [m]; those of BOX, if there is one (default: sides that are
+            periodic
+            already).
+        xv : velocity of the right side relative to the left one [m/s], negative to shorten; 0 ends it. The strain
+            rate is
+            xv / (right - left): particles that are not fixed along x get the velocities of a homogeneous strain, and
+        those
+            that pass the sides change their velocity by xv (default: unchanged).
         """
     def ball(
         self,
@@ -503,7 +511,8 @@ class ParticleCommands:
         """
     def hist(self, id: int, interval: int, what: str) -> None:
         """HIST: record a quantity every `interval` steps in hist_id_<id>.dat and hist_<id>.csv: kinetic, step, time,
-        unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or "gstress group a", "gstrain group a|b",
+        unbalanced, contacts, bonds, energy, deflection, period, sxx, syy or sxy, or "gstress group a", "gstrain
+        group a|b",
         "xstress wall 3", "ystrain wall 0|3". Strains are zero at this command.
         """
     def plot(self, y: int, x: int) -> None:

@@ -256,5 +256,6 @@ class Model(ABC):
         """Make the storage of rows[order] with ghosts, which a new halo keeps current; columns, boxes: which rows of
         neighbours are copied, see `Ownership.sends`. Collective."""
         sends = self.ownership.sends(cell, columns, boxes)
-        storage, self.halo = connect(self.comm, rows, order, sends, self.threads, self.ownership.period)
+        around = self.ownership.period, self.ownership.widening
+        storage, self.halo = connect(self.comm, rows, order, sends, self.threads, *around)
         return storage

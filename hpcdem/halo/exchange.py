@@ -19,6 +19,8 @@ from hpcdem.core.memory import aligned, take_rows
 
 ROWS = 11
 """Tag of messages."""
+SPEED = 2
+"""Column of the velocity along x in rows of a periodic model (core.fields.VX)."""
 BACK = 1
 """Offset of the tag for a second table of rows."""
 ONWARDS = 2
@@ -37,11 +39,12 @@ class Halo:
     images: owned rows (ranges) that are sent past an end of a periodic model.
     """
 
-    def __init__(self, comm: Comm, n_own: int, sends: Sends, period: float = 0.0) -> None:
+    def __init__(self, comm: Comm, n_own: int, sends: Sends, period: float = 0.0, widening: float = 0.0) -> None:
         """sends: rows for each rank with which this one exchanges ghosts, by ascending rank. Both ranks list each
         other; either may send nothing. period [m]: length of a periodic model; ghosts from past its ends are images,
-        moved by it in the first column of rows that hold positions. Collective among them."""
-        self.comm, self.n_own, self.period = comm, n_own, period
+        moved by it in the first column of rows that hold positions; widening [m/s]: its rate, by which images of rows
+        that hold velocities, x in their third column, are faster. Collective among them."""
+        self.comm, self.n_own, self.period, self.widening = comm, n_own, period, widening
         self.requests: list = []
         self.more: list = []
         self._packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -67,21 +70,24 @@ class Halo:
         self._images = [(to, by) for to, _, by in past]
         self.images = [_shifted(sent, -self.n_left) for _, sent, _ in past]
 
-    def fill(self, rows: np.ndarray, places: bool = False) -> None:
-        """Set the ghost rows of any array in storage order (n, ...) from their owners; places: it begins with x [m].
-        Collective."""
+    def fill(self, rows: np.ndarray, speeds: bool = False) -> None:
+        """Set the ghost rows of any array in storage order (n, ...) from their owners; speeds: it begins with x, y and
+        the velocity along x, those of images are moved. Collective."""
         if self.comm.size == 1:
             for _, to, sent in self._pieces:
                 rows[to] = rows[sent]
         elif self._pieces:
             self._swap((number, _bytes(rows[to]), _bytes(rows[sent])) for number, to, sent in self._pieces)
-        if places:
-            self.move_images(rows)
+        if speeds:
+            self.move_images(rows, speeds)
 
-    def move_images(self, rows: np.ndarray) -> None:
-        """Move the images among rows (n, ...) in storage order, which begin with x [m], by the period."""
+    def move_images(self, rows: np.ndarray, speeds: bool = False, period: float = 0.0) -> None:
+        """Move the images among rows (n, ...) in storage order, which begin with x [m], by the period, the present
+        one or another; speeds: they begin with x, y and the velocity along x, which changes by the widening."""
         for to, by in self._images:
-            rows[to, 0] += by * self.period
+            rows[to, 0] += by * (period or self.period)
+            if speeds and self.widening:
+                rows[to, SPEED] += by * self.widening
 
     def _swap(self, parts: Iterable[tuple[int, np.ndarray, np.ndarray]]) -> None:
         """Exchange messages with neighbours; parts: (number of the neighbour, received, sent)."""
@@ -96,12 +102,13 @@ class Halo:
         tags = (tag, tag + ONWARDS) if number > self.comm.rank else (tag + ONWARDS, tag)
         return number % self.comm.size, *tags
 
-    def add_ghost_field(self, rows: np.ndarray, places: bool = False) -> None:
-        """Include this array in `refresh`; its memory must not move. places: it begins with x [m]."""
+    def add_ghost_field(self, rows: np.ndarray, speeds: bool = False) -> None:
+        """Include this array in `refresh`; its memory must not move. speeds: it begins with x, y and the velocity along
+        x."""
         self._persistent(rows, ROWS, self.requests, self._packed)
         if self.comm.size == 1:
             self._copied += [(rows, to, sent) for _, to, sent in self._pieces]
-        if places and self._images:
+        if speeds and self._images:
             self._places.append(rows)
 
     def add_late_ghost_field(self, rows: np.ndarray) -> None:
@@ -140,7 +147,7 @@ class Halo:
         if self.requests:
             self.comm.wait_all(self.requests)
         for rows in self._places:
-            self.move_images(rows)
+            self.move_images(rows, speeds=True)
 
     def refresh(self) -> None:
         """Renew the ghosts: `start` and `finish` in one."""
@@ -195,13 +202,14 @@ def _border(n: int, sends: Sends) -> tuple[list[tuple[int, int]], tuple[int, int
 
 
 def connect(
-    comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int, period: float = 0.0
-) -> tuple[np.ndarray, Halo]:
+    comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int, period: float = 0.0,
+    widening: float = 0.0,
+) -> tuple[np.ndarray, Halo]:  # fmt: skip
     """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current; sends: of
-    these rows, period: see `Halo`. The rows begin with x [m]."""
-    halo = Halo(comm, len(order), sends, period)
+    these rows; period, widening: see `Halo`. Where there is a period, rows begin with x, y and the velocity along x."""
+    halo = Halo(comm, len(order), sends, period, widening)
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
-    halo.fill(storage, places=True)
-    halo.add_ghost_field(storage, places=True)
+    halo.fill(storage, speeds=True)
+    halo.add_ghost_field(storage, speeds=True)
     return storage, halo

@@ -36,6 +36,8 @@ class Ownership:
         """Number of columns of a periodic model, 0 to around - 1; 0 for others."""
         self.period = 0.0
         """Its length [m]."""
+        self.widening = 0.0
+        """Velocity of its right side relative to the left one [m/s]."""
         self._busy, self._step = 0.0, 0
 
     def cells(self, points: np.ndarray, side: float) -> np.ndarray:

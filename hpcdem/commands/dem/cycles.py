@@ -16,7 +16,7 @@ from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import with_prefix
 from hpcdem.engine.due import Task, answer, first_after
-from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem import diagnostics, periodic
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.guards import NAMED
 from hpcdem.physics.dem.kernels.contacts import MODEL
@@ -106,6 +106,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
     """Close and check the model and determine its time step, before the first cycle. Collective."""
     _check_materials(sim)
     surface.check(sim)
+    periodic.check(sim)
     if sim.clumps and sim.settings.disk != "on":
         raise CommandError(
             f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "

@@ -16,7 +16,7 @@ DRAW_INTERVAL = 1000
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     """HIST: record a quantity every `interval` steps in hist_id_<id>.dat and hist_<id>.csv: kinetic, step, time,
-    unbalanced, contacts, bonds, energy, deflection, sxx, syy or sxy, or "gstress group a", "gstrain group a|b",
+    unbalanced, contacts, bonds, energy, deflection, period, sxx, syy or sxy, or "gstress group a", "gstrain group a|b",
     "xstress wall 3", "ystrain wall 0|3". Strains are zero at this command.
     """
     if interval <= 0:
@@ -27,6 +27,8 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
         )
     if what == "deflection" and not sim.bases:
         raise CommandError("HIST deflection: no base bends yet; give FLEXURE first")
+    if what == "period" and not sim.settings.period:
+        raise CommandError("HIST period: the sides are not periodic yet; give PERIODIC first")
     if what in mean_stress.COMPONENTS:
         mean_stress.heights(sim)
     sim.history_origins.pop(id, None)

@@ -205,6 +205,7 @@ HISTORIES: dict[str, tuple[str, Callable[[Simulation], float]]] = {
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
     "deflection": ("m", deflection),
+    "period": ("m", lambda sim: sim.settings.period),
     **{name: ("Pa", partial(mean_stress.mean, name=name)) for name in mean_stress.COMPONENTS},
 }
 """Quantities that HIST can record: unit and function of the simulation."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hpcdem.core import limits
@@ -117,15 +119,32 @@ def _place(sim: Simulation, id: int, nodes: tuple[tuple[float, float], tuple[flo
     sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
 
 
-def periodic(sim: Simulation, x: tuple[float, float]) -> None:
-    """PERIODIC: make x = left and x = right periodic boundaries: particles that leave through one enter through the
-    other, and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its left
-    and right walls.
+def periodic(sim: Simulation, x: tuple[float, float] | None = None, xv: float | None = None) -> None:
+    """PERIODIC: make x = left and x = right periodic sides: particles that leave through one enter through the other,
+    and are in contact across them. Horizontal walls that span both continue without an end; BOX loses its left and
+    right walls. The right side can move.
 
     Parameters
     ----------
-    x : coordinates of the boundaries, (left, right) [m] (default: those of BOX).
+    x : coordinates of the sides, (left, right) [m]; those of BOX, if there is one (default: sides that are periodic
+        already).
+    xv : velocity of the right side relative to the left one [m/s], negative to shorten; 0 ends it. The strain rate is
+        xv / (right - left): particles that are not fixed along x get the velocities of a homogeneous strain, and those
+        that pass the sides change their velocity by xv (default: unchanged).
     """
+    if xv is not None and not math.isfinite(xv):
+        raise CommandError(f"PERIODIC: xv must be a finite number, got {xv:g}")
+    if x is not None:
+        _make_periodic(sim, x)
+    elif xv is None or not sim.settings.period:
+        raise CommandError("PERIODIC: give x, the left and the right side")
+    if xv is not None:
+        sim.open_model()
+        periodic_sides.strain(sim, xv)
+        sim.check_soon()
+
+
+def _make_periodic(sim: Simulation, x: tuple[float, float]) -> None:
     left, right = x
     limits.check_nodes((left, 0.0), (right, 0.0), name="PERIODIC")
     if not left < right:

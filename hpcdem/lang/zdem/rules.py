@@ -65,7 +65,9 @@ def _box(s: Statement) -> None:
 
 
 def _periodic(s: Statement) -> None:
-    if not has_expressions(s.get("x")):
+    if "x" not in s.arguments and "xv" not in s.arguments:
+        raise s.error("give x, the left and the right side, or xv, a velocity of the right side")
+    if "x" in s.arguments and not has_expressions(s.get("x")):
         left, right = s.get("x")
         if not left < right:
             raise s.error(f"the left side, {left}, must be below the right side, {right}")

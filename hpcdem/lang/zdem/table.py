@@ -535,8 +535,14 @@ COMMANDS = (
         "an end; other walls must keep their distance from the sides. Frames contain positions between the sides and "
         "the crossings (laps). Not with clumps, FLEXURE, SURFACE or coupled blocks.",
         source="X",
-        options=(Option("x", "left and right side", kind=INTERVAL, unit="m", required=True, source="X"),),
-        example=("PERIODIC x (0.0, 20.0)",),
+        options=(
+            Option("x", "left and right side; left out where the sides are periodic already", kind=INTERVAL, unit="m",
+                   source="X"),
+            Option("xv", "velocity of the right side relative to the left one, negative to shorten; 0 ends it. "
+                   "Particles that are not fixed along x get the velocities of a homogeneous strain", kind=FLOAT, unit="m/s",
+                   source="X"),
+        ),
+        example=("PERIODIC x (0.0, 20.0)", "PERIODIC xv -0.5"),
         does="walls.periodic",
     ),
     # ---- particles
@@ -822,6 +828,7 @@ COMMANDS = (
             Option("time", "record the time", source="X"),
             Option("unbalanced", "record the unbalanced force over the mean contact force", source="X"),
             Option("deflection", "record the largest deflection of the bases of FLEXURE", source="X"),
+            Option("period", "record the distance between periodic sides", source="X"),
             Option("contacts", "record the number of closed contacts", source="X"),
             Option("bonds", "record the number of bonds", source="X"),
             *(Option(name, f"record the mean stress {text} between periodic sides and the floor and lid of BOX [Pa]",

@@ -464,6 +464,8 @@ def frame(sim: Simulation) -> Frame:
     if s.period:
         columns["x"], crossed = periodic.inside(sim, p["x"])
         columns[periodic.LAPS] += crossed
+        if s.widening:
+            columns["vx"] = p["vx"] - crossed * s.widening
     columns["color"], columns["group"] = p["color"].astype(np.int32), p["group"].astype(np.int32)
 
     out, iout = contact_rows(sim)

@@ -82,11 +82,12 @@ def name_slipped(sim: Any) -> None:
     origin[p.owned] = sim.origin
     chain = None
     if sim.rows:
-        sim.halo.fill(origin, places=True)
+        sim.halo.fill(origin)
+        sim.halo.move_images(origin, period=sim.rebuild_state.period)
         chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, sim.rows, sim.rebuild_state.side)
         sim.halo.fill(chain)
         for k in range(0, chain.shape[1], 2):
-            sim.halo.move_images(chain[:, k:])
+            sim.halo.move_images(chain[:, k:], period=sim.rebuild_state.period if k % 4 else 0.0)
     paths = np.where(mine[:, None], walls.ways(), np.nan)
     kinds = slips.found(sim.lists, p.hot, origin, chain, walls.table()[:, :4].copy(), paths)
     if not sim.comm.any(bool(kinds.any())):

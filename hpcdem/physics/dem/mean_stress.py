@@ -17,7 +17,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import X, Y
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.dem import diagnostics, periodic
 
 COMPONENTS = {"sxx": (X, X), "syy": (Y, Y), "sxy": (X, Y)}
 """Direction of the force and of the normal of the plane."""
@@ -61,6 +61,11 @@ def _branches(sim: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     lone = diagnostics.storage_rows(sim, wall_ids[:, 0])
     force = np.concatenate([out, wall_out])[:, [diagnostics.FORCE_X, diagnostics.FORCE_Y]]
     at = wall_out[:, [diagnostics.AT_X, diagnostics.AT_Y]]
-    branch = np.concatenate([hot[second][:, [X, Y]] - hot[first][:, [X, Y]], at - hot[lone][:, [X, Y]]])
-    branch[:, X] -= period * np.rint(branch[:, X] / period)  # an image may have been found in place of a partner
+    # An image may be found in place of a partner: back between the sides, where its position is exact.
+    x = periodic.inside(sim, hot[:, X])[0]
+    branch = np.concatenate([
+        np.column_stack([x[second] - x[first], hot[second, Y] - hot[first, Y]]),
+        np.column_stack([at[:, 0] - hot[lone, X], at[:, 1] - hot[lone, Y]]),
+    ])  # fmt: skip
+    branch[:, X] -= period * np.rint(branch[:, X] / period)
     return force, branch, hot[np.concatenate([first, lone]), Y]

@@ -7,6 +7,11 @@ sides is computed from both of them, as at the boundary of two ranks. L is a who
 The sides, L and all positions near a side are multiples of one power of two, the spacing of floating-point numbers at
 the farthest image. Then x + L and x - L are exact, both sides see the same distance, and their forces are opposite to
 the last bit.
+
+The right side can move relative to the left one, with the velocity V (widening): L = L0 + V t. An image past the right
+side is then faster by V, one past the left side slower, and a particle that leaves through one side enters through the
+other with its velocity changed by V: a homogeneous strain rate V / L of the medium of all images. Velocities near a
+side are multiples of a power of two as well.
 """
 
 from __future__ import annotations
@@ -19,10 +24,11 @@ import numpy as np
 
 from hpcdem.core.cells import COLUMN, columns, keys
 from hpcdem.core.errors import CommandError
-from hpcdem.core.fields import X
+from hpcdem.core.fields import FIX_X, VX, X
 
 LAPS = "laps"
 FIELDS = {LAPS: ("1", "crossings of the periodic sides to the right; x + laps * period is continuous", 0.0)}
+FASTEST = 4096.0
 FEWEST = 3
 """Columns at least: with fewer a particle could meet another one on both sides."""
 
@@ -44,12 +50,65 @@ def rounded_sides(left: float, right: float) -> tuple[float, float]:
     return left, right - left
 
 
+def unit(sim: Any) -> float:
+    """Return the power of two [m] of which the length and the positions beside the sides are multiples."""
+    s = sim.settings
+    return spacing(s.side, s.period) * (2.0 if s.widening else 1.0)  # it may double from one step to the next
+
+
+def speed_unit(widening: float) -> float:
+    """Return the power of two [m/s] of which the velocity of the right side and velocities beside the sides are
+    multiples: sums of both are exact for particles up to FASTEST times as fast as it."""
+    return math.ulp(FASTEST * abs(widening))
+
+
 def begin(sim: Any) -> None:
     """Prepare an open model for the periodic sides in its settings."""
-    s = sim.settings
     sim.particles.extend(FIELDS)
-    sim.walls.far = s.side - s.period, s.side + 2.0 * s.period
+    _continue_walls(sim)
     sim.ownership.wanted = True
+
+
+def _continue_walls(sim: Any) -> None:
+    s = sim.settings
+    sim.walls.far = s.side - s.period, s.side + 2.0 * s.period
+
+
+def strain(sim: Any, velocity: float) -> None:
+    """Let the right side move at this velocity [m/s] relative to the left one from now on. The velocities of particles
+    that are not fixed along x change with their distance from the left side, as in a homogeneous strain."""
+    s, p = sim.settings, sim.particles
+    velocity = float(_rounded(velocity, speed_unit(velocity))) if velocity else 0.0
+    change = (velocity - s.widening) / s.period
+    free = (p["fix"] & FIX_X) == 0
+    p["vx"][free] += change * (p["x"][free] - s.side)
+    s.widening = velocity
+    s.period = float(_rounded(s.period, unit(sim)))
+    s.since, s.length = sim.clock.time, s.period
+
+
+def widen(sim: Any) -> None:
+    """Move the right side to where it is at the end of this step."""
+    s, clock = sim.settings, sim.clock
+    s.period = float(_rounded(s.length + s.widening * (clock.time + clock.dt - s.since), unit(sim)))
+    sim.halo.period = s.period
+
+
+def travel(sim: Any) -> tuple[float, float]:
+    """Return the part of each partner in the approach of a pair across the sides by their motion since the lists were
+    built [m], and in a step."""
+    s = sim.settings
+    return 0.5 * abs(s.period - sim.rebuild_state.period), 0.5 * abs(s.widening) * sim.clock.dt
+
+
+def check(sim: Any) -> None:
+    """CommandError where moving sides are not supported."""
+    s = sim.settings
+    if not s.widening:
+        return
+    what = "SET energy: the work of the sides is not in the budget" if s.energy else "SET damp lsm" if s.lsm else ""
+    if what:
+        raise CommandError(f"PERIODIC xv does not support {what}")
 
 
 def inside(sim: Any, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,28 +134,33 @@ def spans(sim: Any, x: tuple[float, float]) -> bool:
     return bool(s.period) and rounded_sides(*x) == (s.side, s.period)
 
 
-def bring_in(sim: Any) -> None:
-    """Bring the particles of an open model between its sides, if these are periodic."""
+def bring_in(sim: Any, frozen: bool) -> None:
+    """Bring the particles of an open model between its sides, if these are periodic. frozen: they are where they were
+    when the lists were built, with later velocities."""
     if not sim.settings.period:
         return
-    x = sim.particles["x"]
-    x[:] = _rounded(x, spacing(sim.settings.side, sim.settings.period))
+    x, velocity = sim.particles["x"], sim.particles["vx"]
+    x[:] = _rounded(x, unit(sim))
     x[:], laps = inside(sim, x)
     sim.particles[LAPS][:] += laps
+    if (widening := sim.settings.widening) and not frozen:
+        velocity[:] = _rounded(velocity, speed_unit(widening)) - laps * widening
 
 
 def snapping(sim: Any, move: Callable[..., None]) -> Callable[..., None]:
     """Return a loop of `kernels.motion` for a closed model. Between periodic sides it also rounds the positions of the
-    particles that have images."""
+    particles that have images, and if the sides move, their velocities."""
     if not sim.halo.images:
         return move
-    p, unit = sim.particles, spacing(sim.settings.side, sim.settings.period)
+    p, widening = sim.particles, sim.settings.widening
 
     def moved(blocks: int, first: int, last: int, *rest: Any) -> None:
         move(blocks, first, last, *rest)
         for rows in sim.halo.images:
-            x = p.hot[p.n_left + max(first, rows.start) : p.n_left + min(last, rows.stop), X]
-            x[:] = _rounded(x, unit)
+            hot = p.hot[p.n_left + max(first, rows.start) : p.n_left + min(last, rows.stop)]
+            hot[:, X] = _rounded(hot[:, X], unit(sim))
+            if widening:
+                hot[:, VX] = _rounded(hot[:, VX], speed_unit(widening))
 
     return moved
 
@@ -111,7 +175,8 @@ def fit(sim: Any) -> None:
             f"PERIODIC: the length {s.period:g} m must be at least {FEWEST} times the reach of contacts and bonds, "
             f"{state.side:g} m (the largest diameter or bond, plus skin)"
         )
-    state.side = s.period / number
+    state.side, state.period = s.period / number, s.period
+    _continue_walls(sim)
     _check_walls(sim, state.side)
 
 
@@ -134,7 +199,7 @@ def cells(sim: Any, hot: np.ndarray) -> np.ndarray:
         plain: np.ndarray = keys(hot, side)
         return plain
     number = round(s.period / side)
-    sim.ownership.around, sim.ownership.period = number, s.period
+    sim.ownership.around, sim.ownership.period, sim.ownership.widening = number, s.period, s.widening
     x, laps = inside(sim, hot[:, X])
     found = keys(np.column_stack([x - s.side, hot[:, 1]]), side)
     column = columns(found)

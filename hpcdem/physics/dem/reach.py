@@ -27,11 +27,13 @@ Box = tuple[float, float, float, float]
 
 @dataclass
 class ListState(RebuildState):
-    """Skin over the largest radius; longest bond [m] as last seen; columns that partners may lie apart."""
+    """Skin over the largest radius; longest bond [m] as last seen; columns that partners may lie apart; period [m] of
+    a periodic model when the lists were built."""
 
     skin_factor: float = NARROW
     bond_reach: float = 0.0
     columns: int = 1
+    period: float = 0.0
 
 
 def choose(sim: Any, frozen: bool, box: Box | None) -> bool:
@@ -39,7 +41,7 @@ def choose(sim: Any, frozen: bool, box: Box | None) -> bool:
 
     Returns whether a particle is outside the box (left, right, bottom, top) [m]: it rides on the same reduction.
     """
-    periodic.bring_in(sim)
+    periodic.bring_in(sim, frozen)
     rebuild_state, p = sim.rebuild_state, sim.particles
     seen = np.array([0.0, sim._longest2, 0.0])
     seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)

@@ -318,7 +318,10 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     gid, moving = p["gid"].copy(), np.hstack([p.positions(), p.cold[:, FX : TORQUE + 1]])
     p["x"][:], p["y"][:] = origin.T
     walls.p1, walls.p2 = walls.at_last_list()
+    period = sim.settings.period
+    sim.settings.period = saved_lattice.period or period
     sim.close_as_saved()
+    sim.settings.period = sim.halo.period = period
     walls.p1, walls.p2, walls.travel, walls.bent = now[0], now[1], travel, bent
     sim.rebuild_state = saved_lattice
     gid, moving = sim.trail.follow(sim.comm, p["gid"], gid, moving)

@@ -11,7 +11,8 @@ class Settings:
     attempts of GEN per particle requested, 0 while not set. thickness: of the model, for pressures and stresses.
     units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots. rolling: type
     of rolling resistance (rolling.py). side: x of the left periodic side, period: length of a periodic model, 0 of
-    others (periodic.py)."""
+    others (periodic.py); widening: velocity of its right side relative to the left one [m/s], since the time `since`
+    [s], when the length was `length`."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -34,3 +35,6 @@ class Settings:
     rolling: str = "c"
     side: float = 0.0
     period: float = 0.0
+    widening: float = 0.0
+    since: float = 0.0
+    length: float = 0.0

@@ -196,6 +196,8 @@ class Simulation(Model):
     def _moved(self) -> None:
         if self._walls_move:
             self.walls.move(self.clock.dt)
+        if self.settings.widening:
+            periodic.widen(self)
 
     def _end_step(self, outdated: int) -> None:
         energy, timers = self.energy, self.timers
@@ -249,6 +251,9 @@ class Simulation(Model):
             guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed, self.comm, alone)
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), self.walls.fastest()) * dt
+        if self.settings.widening:
+            sides = periodic.travel(self)
+            path, stride = path + sides[0], stride + sides[1]
         margin = 0.5 * rebuild_state.skin - path
         if glance and not rebuild_state.is_too_late(margin, stride) and found[5 + fast.DUE] == 0.0:
             hurry = found[5 + fast.HURRY]  # half the margin over the stride, of the fast ones
