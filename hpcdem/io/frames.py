@@ -143,7 +143,7 @@ def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None, p
         raise HpcdemError(f"cannot read {os.fspath(path)}: frames end in .vtkhdf or .dat")
     if "period" in frame.settings and not periodic:
         raise HpcdemError(
-            f"{os.fspath(path)}: the sides of this model are periodic (PERIODIC). Measures and sections of frames do "
-            "not support them; use the command stress, HIST, or the columns x and laps of the frames"
+            f"{os.fspath(path)}: the sides of this model are periodic (PERIODIC), which stress and strain of sections "
+            "do not support; use hpcdem measure, the command stress, HIST, or the columns x and laps of the frames"
         )
     return frame

@@ -539,8 +539,8 @@ COMMANDS = (
             Option("x", "left and right side; left out where the sides are periodic already", kind=INTERVAL, unit="m",
                    source="X"),
             Option("xv", "velocity of the right side relative to the left one, negative to shorten; 0 ends it. "
-                   "Particles that are not fixed along x get the velocities of a homogeneous strain", kind=FLOAT, unit="m/s",
-                   source="X"),
+                   "Particles that are not fixed along x get the velocities of a homogeneous strain", kind=FLOAT,
+                   unit="m/s", source="X"),
         ),
         example=("PERIODIC x (0.0, 20.0)", "PERIODIC xv -0.5"),
         does="walls.periodic",

@@ -16,6 +16,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.disk import explain
 from hpcdem.post.measure.grains import Grains
+from hpcdem.post.measure.images import inside
 
 LEVELS = 0.1, 0.5
 """Damage from which particles are counted."""
@@ -41,7 +42,11 @@ def change(before: Grains, after: Grains) -> Change:
     there = np.isin(before.bonds, after.gid).all(axis=1)
     broke = gone & there
     row = np.searchsorted(before.gid, before.bonds[broke])
-    place = np.stack([before.x[row].mean(axis=1), before.y[row].mean(axis=1)], axis=1)
+    x = before.x[row]
+    across = x[:, 1] - x[:, 0]
+    if before.period:
+        across -= before.period * np.rint(across / before.period)
+    place = np.stack([inside(before, x[:, 0] + 0.5 * across), before.y[row].mean(axis=1)], axis=1)
     parted = ~np.isin(old[broke], touching)
     made = after.bonds[~np.isin(new, old)]
     return Change(before.bonds[broke], place, parted, made, int((gone & ~there).sum()))

@@ -16,7 +16,7 @@ from hpcdem.io.vtkhdf_mesh import is_mesh_frame, read_mesh_frame
 from hpcdem.post.surface import held_fast
 
 Walls = dict[int, tuple[tuple[float, float], tuple[float, float]]]
-_COLUMNS = ("gid", "x", "y", "r", "color", "group", "fixed")
+_COLUMNS = ("gid", "x", "y", "r", "color", "group", "fixed", "laps")
 
 
 def _no_pairs() -> np.ndarray:
@@ -29,7 +29,8 @@ class Grains:
 
     gid, x, y, r [m], color, group (names): (n,) each; bonds, contacts: (m, 2) ids of the pairs, where they were read;
     time [s]; ini: the state before the first step of a command; fixed (n,): held along x and y, as rows of
-    particles are that stand for walls.
+    particles are that stand for walls; side, period: x of the left periodic side and the distance of the sides [m], 0
+    of other models; laps (n,): crossings of these sides to the right.
     """
 
     step: int
@@ -45,10 +46,20 @@ class Grains:
     bonds: np.ndarray = field(default_factory=_no_pairs)
     contacts: np.ndarray = field(default_factory=_no_pairs)
     fixed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    side: float = 0.0
+    period: float = 0.0
+    laps: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if len(self.fixed) != len(self.gid):
             object.__setattr__(self, "fixed", np.zeros(len(self.gid), bool))
+        if len(self.laps) != len(self.gid):
+            object.__setattr__(self, "laps", np.zeros(len(self.gid)))
+
+    @staticmethod
+    def columns() -> tuple[str, ...]:
+        """Names of the columns of particles."""
+        return _COLUMNS
 
     def __len__(self) -> int:
         return len(self.gid)
@@ -60,7 +71,7 @@ class Grains:
     def moved(self, x: float, y: float) -> Grains:
         """Return everything moved by (x, y) [m]."""
         walls = {i: ((a[0] + x, a[1] + y), (b[0] + x, b[1] + y)) for i, (a, b) in self.walls.items()}
-        return replace(self, x=self.x + x, y=self.y + y, walls=walls)
+        return replace(self, x=self.x + x, y=self.y + y, side=self.side + x, walls=walls)
 
     def drawn(self, walls: int = 5) -> Frame:
         """A frame that holds what pictures need, walls in this colour; without the sides of the BOX."""
@@ -76,7 +87,7 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     """The grains of one frame file. tables: "bonds" and "contacts", where wanted. Raises HpcdemError."""
     if path.suffix == ".vtkhdf" and is_mesh_frame(path):
         return elements(path)
-    frame = read_frame(path, ["particles", *tables], periodic=False)
+    frame = read_frame(path, ["particles", *tables])
     p = frame.tables["particles"].columns
     none = np.zeros(0)
     gid = np.asarray(p.get("gid", none), dtype=np.int64)
@@ -91,7 +102,15 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     pairs = {name: _pairs(frame, name) for name in tables}
     group = names[np.where((row >= 0) & (row < len(names)), row, len(names) - 1)]
     fixed = held_fast(p, len(gid))[order]
-    return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
+    found = Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
+    if not (period := float(frame.settings.get("period", 0.0))):
+        return found
+    if "laps" not in p:
+        raise HpcdemError(
+            f"{path}: the sides of this model are periodic (PERIODIC), and this file does not contain the crossings of "
+            "the particles (laps); measure frames *.vtkhdf"
+        )
+    return replace(found, side=float(frame.settings["left"]), period=period, laps=np.asarray(p["laps"], float)[order])
 
 
 def elements(path: Path) -> Grains:
@@ -123,7 +142,7 @@ def walls_of(path: Path) -> Walls:
     """The walls of a frame file alone. Raises HpcdemError."""
     if path.suffix == ".vtkhdf" and is_mesh_frame(path):
         return {}
-    return _walls(read_frame(path, (), periodic=False))
+    return _walls(read_frame(path, ()))
 
 
 def _pairs(frame: Frame, name: str) -> np.ndarray:

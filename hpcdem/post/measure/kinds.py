@@ -12,6 +12,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 from hpcdem.post.measure import cracks, fault_history, faults, layers, wedge
 from hpcdem.post.measure.grains import Grains, Walls
+from hpcdem.post.measure.images import extended
 from hpcdem.post.measure.scene import Plan, Scene, Stamp
 from hpcdem.post.measure.surface import surface
 from hpcdem.post.section import read_section
@@ -131,10 +132,14 @@ def faults_part(scene: Scene) -> Faults | None:
         rows = p["x"] + move[0], p["y"] + move[1], p["radius"], p["color"]
         now = Grains(now.step, p["gid"], *rows, np.full(len(p["gid"]), "", object), walls)
     else:
-        found = None if scene.before is None else faults.between(scene.before, now, plan.cell)
+        before, after = scene.before, now
+        if before is not None and now.period:
+            before, after = extended(before, now)
+        found = None if before is None else faults.between(before, after, plan.cell)
         if found is None:
             return None
         x, y, field = found
+        now = after
     request = plan.request
     cell = float(x[1] - x[0]) if len(x) > 1 else plan.cell
     threshold = request.strain if request.strain is not None else TOTAL if total else STEP
@@ -147,6 +152,10 @@ def faults_part(scene: Scene) -> Faults | None:
     if np.isfinite(face := plan.face(now)):
         low = np.where(plan.forward * (x - face) < skin, np.inf, low)
     picked = faults.bands(x, y, field, threshold, shortest, low[None, :])
+    if now.period:  # each once, whole beyond the side if it crosses one
+        right = now.side + now.period
+        picked = [band for band in picked if now.side <= band.centre[0] < right]
+        field, now = np.where((x >= now.side) & (x < right), field, NAN), scene.all
     ids = tuple(fault_history.members(band, now, cell) for band in picked) if request.over_time else ()
     return Faults(picked, total, threshold, ids, x, y, np.where(y[:, None] >= low, field, NAN), now)
 
@@ -290,10 +299,10 @@ def history_sheets(stamps: Sequence[Stamp], found: fault_history.History) -> lis
 
 
 def tracks_part(scene: Scene) -> np.ndarray:
-    """Return id, x, y of the followed particles (n, 3)."""
+    """Return id, x, y of the followed particles (n, 3); x is continuous across periodic sides."""
     g = scene.all
     rows = np.flatnonzero(np.isin(g.gid, scene.plan.followed))
-    return np.stack([g.gid[rows], g.x[rows], g.y[rows]], axis=1)
+    return np.stack([g.gid[rows], g.x[rows] + g.period * g.laps[rows], g.y[rows]], axis=1)
 
 
 def paths(done: Done) -> dict[int, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.post.measure.grains import Grains
+from hpcdem.post.measure.images import extended
 from hpcdem.post.measure.triangles import shares
 
 
@@ -26,7 +27,9 @@ class Area:
 
 def areas(g: Grains) -> dict[tuple[str, str], Area]:
     """Areas by (kind, name): ("all", ""), ("color", number), ("group", name)."""
-    discs, envelope = np.pi * g.r * g.r, shares(g.x, g.y, g.r, 4.0 * float(np.max(g.r, initial=0.0)))
+    around = extended(g)[0] if g.period else g  # the images hold what lies beside the sides
+    discs = np.pi * g.r * g.r
+    envelope = shares(around.x, around.y, around.r, 4.0 * float(np.max(g.r, initial=0.0)))[: len(g)]
 
     def of(chosen: np.ndarray) -> Area:
         return Area(int(chosen.sum()), float(discs[chosen].sum()), float(envelope[chosen].sum()))

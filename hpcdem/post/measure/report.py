@@ -67,6 +67,9 @@ def run(comm: Comm, log: Any, request: Request, without: Sequence[str] = ()) -> 
     written: list[Path] = []
     if of_frames:
         plan, final = on_first(comm, lambda: make_plan(request, of_frames))
+        if plan.period:
+            _refuse_periodic(request)
+            what, of_frames = ([kind for kind in some if kind != "wedge"] for some in (what, of_frames))
         on_first(comm, lambda: _report(log, plan, final, of_frames))
         parts = _measure(comm, log, plan, of_frames)
         history = _follow(comm, log, plan, parts["faults"]) if request.over_time and "faults" in what else None
@@ -93,6 +96,8 @@ def _report(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     first, last = plan.frames[0], plan.frames[-1]
     count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
     row = f"{len(plan.row)} particles fixed along x and y push" if len(plan.row) else "no wall moves along x"
+    if plan.period:
+        row = f"periodic sides, {plan.period:g} m apart at first and {final.period:g} m at last"
     wall = row if plan.wall is None else f"wall {plan.wall} moves"
     hint = "; --from 0 includes the frames before it moves" if plan.request.first is None and first.step > 0 else ""
     log.info(f"{count}; {wall}{hint}; columns of {plan.cell:g} m")
@@ -103,6 +108,15 @@ def _report(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
         )
     if others := left_out(plan.request.folder):
         log.warn(others)
+
+
+def _refuse_periodic(request: Request) -> None:
+    """HpcdemError for measurements that a model with periodic sides does not have."""
+    why = "the sides of this model are periodic (PERIODIC)"
+    if "wedge" in request.what:
+        raise HpcdemError(f"wedge: {why}: nothing pushes, and there is no toe; measure surface")
+    if request.over_time:
+        raise HpcdemError(f"faults --over-time: {why}, and faults are not followed across them; measure faults")
 
 
 def _report_no_wedge(log: Any, done: Done) -> None:

@@ -100,8 +100,8 @@ class Request:
 @dataclass(frozen=True)
 class Plan:
     """Settings for all frames: frames in order of time, those with sections, width of columns [m], the pushing wall or
-    the ids of the pushing row of particles, its direction +1 or -1, its position in the first frame [m], and ids of
-    particles to follow.
+    the ids of the pushing row of particles, its direction +1 or -1, its position in the first frame [m], ids of
+    particles to follow, and distance of periodic sides in the first frame [m], 0 of other models.
     """
 
     request: Request
@@ -113,6 +113,7 @@ class Plan:
     forward: int
     start: float
     followed: np.ndarray
+    period: float = 0.0
 
     def face(self, g: Grains) -> float:
         """Return x of the face of the pushing wall or row [m]; NaN without one."""
@@ -121,7 +122,9 @@ class Plan:
         return face_of_row(g, self.row, self.forward) if len(self.row) else float("nan")
 
     def shortening(self, g: Grains) -> float:
-        """Return the displacement of the pushing wall or row [m]; NaN without one."""
+        """Return the displacement of the pushing wall or row, or the approach of periodic sides [m]; NaN without them."""
+        if self.period:
+            return self.period - g.period
         return self.forward * (self.face(g) - self.start)
 
 
@@ -150,7 +153,7 @@ def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
         frozenset() if request.increment or request.over_time else frozenset(p.stem for p in folder.glob("all_*.npz"))
     )
     followed = _followed(request, first, last) if "tracks" in what else np.zeros(0, np.int64)
-    return Plan(request, frames, sections, cell, wall, row, forward, start, followed), last
+    return Plan(request, frames, sections, cell, wall, row, forward, start, followed, first.period), last
 
 
 def _pusher(request: Request, frames: list[FrameFile]) -> tuple[int | None, np.ndarray, list[FrameFile]]:

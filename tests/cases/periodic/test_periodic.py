@@ -31,6 +31,7 @@ from hpcdem.physics.dem import diagnostics, mean_stress, periodic, saved_state
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.diffusion.model import Diffusion
+from hpcdem.post import strain_stress
 from hpcdem.post.measure.grains import grains
 from hpcdem.post.view.moment import read_moment
 from tests.cases.periodic import exact
@@ -302,9 +303,12 @@ def test_frames_hold_places_between_the_sides_and_continuous_ones(tmp_path):
     assert moved[:, 0] == pytest.approx(x + LENGTH * laps - begun, abs=1e-12)
     text = read_frame(path.with_suffix(".dat"))
     assert text.settings["period"] == LENGTH
-    for file in (path, path.with_suffix(".dat")):
-        with pytest.raises(HpcdemError, match="periodic"):
-            grains(file)
+    read = grains(path)
+    assert (read.side, read.period) == (0.0, LENGTH) and np.array_equal(read.laps, p["laps"][np.argsort(p["gid"])])
+    with pytest.raises(HpcdemError, match=r"does not contain the crossings of the particles .laps.; measure frames"):
+        grains(path.with_suffix(".dat"))
+    with pytest.raises(HpcdemError, match="periodic"):
+        strain_stress.look(path, strain_stress.Options(tmp_path, 0.5))
 
 
 def test_a_range_takes_particles_by_their_place_between_the_sides(tmp_path):
