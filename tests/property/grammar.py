@@ -92,8 +92,10 @@ class Maker:
         self.groups = ["bed"]
         self.balls = 0
         self.walls: dict[int, float] = {}
+        self.processes: set[int] = set()
         self.saves = 0
         self.accounts = self.pressed = self.rebounds = False
+        self.around = self.strained = self.bends = self.settles = self.pulls = self.drags = False
 
     # ---- drawing
 
@@ -204,11 +206,14 @@ class Maker:
             self.add("SET outdir", self.pick("results", "data/inner"))
         self.add("SET disk", self.disk)
         pull = self.pick(2e-5, 2e-4, 0.0) * self.r / self.dt**2
+        self.pulls = pull > 0.0
         self.add("SET gravity", number(pull * self.pick(0.0, 0.5, -1.0)), number(-pull))
         if self.chance(25):
             self.add(f"SET frac {self.share}")
         else:
-            self.add("SET dt", number(self.dt), self.perhaps(20, f"damp lsm {number(self.drag())}"))
+            drag = self.perhaps(20, f"damp lsm {number(self.drag())}")
+            self.drags = bool(drag)
+            self.add("SET dt", number(self.dt), drag)
         more = [
             self.perhaps(20, f"seed {self.whole(0, 99)}"), self.perhaps(15, "wallside", self.pick("left", "both")),
             self.perhaps(15, f"gentry {self.pick('3', '0.5', '40')}"), self.perhaps(15, f"stepbar {self.whole(7, 90)}"),
@@ -237,18 +242,30 @@ class Maker:
     def intervals(self) -> None:
         """Outputs, not too many of them. The account of energy does not go with pressures, nor with dashpots."""
         for name, percent in (("print", 40), ("save", 20), ("vtk", 15), ("ps", 15), ("energy", 20)):
-            if self.chance(percent) and not (name == "energy" and (self.pressed or self.rebounds)):
+            if self.chance(percent) and not (
+                name == "energy" and (self.pressed or self.rebounds or self.strained or self.bends)
+            ):
                 self.add("SET", name, str(self.pick(50, 70, 130, 0)))
                 self.accounts |= name == "energy"
 
     def enclosure(self) -> None:
         r, fric = self.r, self.pick("0.0", "0.4")
-        if self.chance(75):
+        self.around = self.chance(20)
+        boxed = self.chance(75)
+        if boxed:
             self.add(
                 f"BOX left {number(self.left - 2 * r)} right {number(self.left + self.width + 2 * r)}",
                 f"bottom {number(self.bottom - 2 * r)} height {number(3 * self.height)}",
                 self.springs() if self.chance(60) else "", self.perhaps(50, f"fric {fric}"),
             )  # fmt: skip
+        if self.around:
+            sides = self.left - 2 * r, self.left + self.width + 2 * r
+            self.add("PERIODIC x", point(*sides))
+            if boxed and self.chance(40):
+                self.add(f"HIST id 8 interval {self.whole(5, 40)}, {self.pick('sxx', 'syy', 'sxy', 'period')}")
+            if self.chance(60):
+                self.wall(0, (sides[0], self.bottom), (sides[1], self.bottom), fric)
+            return
         right, top = self.left + self.width, self.bottom + 2 * self.height
         corners = {
             0: ((self.left, self.bottom), (right, self.bottom)),
@@ -283,15 +300,22 @@ class Maker:
 
     def populate(self) -> None:
         """One to three kinds of particles, then what they are made of."""
-        kinds = ["gen", "grid", "row", "ball", *(["clumps"] if self.disk == "on" else [])]
+        kinds = ["gen", "grid", "row", "ball", *(["clumps"] if self.may_clump else [])]
         for kind in self.draw(st.lists(st.sampled_from(kinds), min_size=1, max_size=3)):
             getattr(self, f"make_{kind}")()
         self.add(self.pick("PROP", "INIT"), self.material())
         if self.chance(30):
             self.add("PROP", self.material(), self.range())
 
+    @property
+    def may_clump(self) -> bool:
+        """Whether the model can have clumps."""
+        return self.disk == "on" and not (self.around or self.settles)
+
     def make_gen(self) -> None:
         low, high = self.left, self.left + self.width
+        if self.around and self.chance(50):
+            low, high = low - 2 * self.r, high + 2 * self.r  # across the sides
         bottom, top = self.bottom, self.bottom + self.height * self.pick(0.7, 0.4, 1.0)
         self.add(
             f"GEN num {self.whole(5, 110)}, {self.radii()}, x {point(low, high)}, y {point(bottom, top)}",
@@ -301,6 +325,8 @@ class Maker:
     def make_grid(self) -> None:
         x0, y0 = self.x(0.0, 0.3), self.y(0.0, 0.3)
         x1, y1 = x0 + 2.4 * self.r * self.whole(2, 9), y0 + 2.4 * self.r * self.whole(2, 6)
+        if self.around:
+            x1 = min(x1, self.left + self.width)
         first = not any(re.match(r"(?i)gen|gli|bal|loa", line) for line in self.lines)
         self.add(
             "GEN grid", f"idmin {self.whole(0, 500)}" if first and self.chance(20) else "", self.radii(),
@@ -312,7 +338,8 @@ class Maker:
         y, x0 = self.y(-0.05, 0.9), self.x(0.0, 0.4)
         name = self.pick("row", "base")
         self.add(
-            f"GLINE p1 {point(x0, y)} p2 {point(x0 + self.r * self.whole(4, 24), y)} rad {number(self.r)}",
+            f"GLINE p1 {point(x0, y)} p2 {point(x0 + self.r * self.whole(4, 9 if self.around else 24), y)}",
+            f"rad {number(self.r)}",
             f"cratio {self.pick('1', '0.98', '0.9')}", self.springs(), self.perhaps(50, "fric 0.2"), self.color(),
             self.group(name),
         )  # fmt: skip
@@ -351,13 +378,13 @@ class Maker:
     # ---- what happens to them
 
     def do_clumps(self) -> None:
-        if self.disk == "on" and BODIES not in self.files:
+        if self.may_clump and BODIES not in self.files:
             self.make_clumps()
             self.add("PROP", self.material(), "RANGE group rock")
 
     def do_join(self) -> None:
         """A few particles of neighbouring ids become one."""
-        if self.disk == "on":
+        if self.may_clump:
             first = self.whole(0, 40)
             self.add(
                 "CLUMP", self.perhaps(30, "color red"), self.perhaps(30, self.group("rock")),
@@ -465,10 +492,10 @@ class Maker:
 
     def do_new_wall(self) -> None:
         """A paddle inside, or the floor once more."""
-        if 0 in self.walls and self.chance(40):
+        if 0 in self.walls and self.chance(40) and not self.around:
             ident, p1, p2 = 0, (self.left, self.bottom), (self.left + self.width, self.bottom)
         else:
-            ident, x, y = 5, self.x(0.2, 0.8), self.y(0.5, 1.2)
+            ident, x, y = 5, self.x(0.2, 0.4 if self.around else 0.8), self.y(0.5, 1.2)
             p1, p2 = (x, y), (x + self.r * self.whole(2, 6), y + self.r * self.whole(-2, 2))
         self.wall(ident, p1, p2, self.pick("0.0", "0.3"))
 
@@ -479,12 +506,65 @@ class Maker:
         elif choice == "gravity":
             pull = 1e-4 * self.r / self.dt**2
             self.add("SET gravity", point(pull * self.between(-1.0, 1.0), -pull))
+        elif choice == "drag" and self.strained:
+            pass
         elif choice == "drag":
+            self.drags = True
             self.add("SET damp lsm", self.pick(number(self.drag()), "0.0"))
         elif choice == "wallside":
             self.add("SET wallside", self.pick("left", "both"))
         else:
             self.intervals()
+
+    def do_strain(self) -> None:
+        """Periodic sides begin to move, move at another rate, or stop."""
+        if self.around and not (self.accounts or self.drags):
+            self.strained = True
+            self.add("PERIODIC xv", number(self.pick(self.velocity(), self.velocity(), 0.0)))
+
+    def do_surface(self) -> None:
+        """A process at the surface; the same id again continues it."""
+        if not self.pulls or self.around or any(line.startswith("CLUMP") for line in self.lines):
+            return
+        ident = self.pick(1, 1, 2)
+        if ident in self.processes and self.chance(20):
+            self.add(f"SURFACE id {ident} off")
+            self.processes.discard(ident)
+            return
+        self.processes.add(ident)
+        self.settles = True
+        r, dt = self.r, self.dt
+        deeds = [
+            self.perhaps(50, f"diffuse {number(r * r / dt * self.pick(0.05, 0.5))}"), self.perhaps(40, "slope 25"),
+            self.perhaps(40, f"erode {number(r / dt * 0.02)} above {number(self.y(0.5, 0.8))}"),
+            self.perhaps(50, f"deposit {number(r / dt * 0.05)} below {number(self.y(0.3, 0.5))}"),
+        ]  # fmt: skip
+        if not any(deeds):
+            deeds = [f"below {number(self.y(0.4, 0.8))}"]
+        makes = [deed for deed in deeds if deed and not deed.startswith("erode")]
+        self.add(
+            f"SURFACE id {ident} interval {self.whole(5, 40)}", *deeds,
+            self.perhaps(30, f"x {point(self.left, self.x(0.6, 0.9))}"),
+            f"rad discrete {number(r)} {number(0.8 * r)} {self.material()}" if makes else "",
+            self.perhaps(30, "episode 30") if makes else "",
+            self.perhaps(20, f"compact 0.5 {number(5 * r)}") if makes else "",
+        )  # fmt: skip
+
+    def do_flexure(self) -> None:
+        """The floor bends on an elastic plate; nothing else moves it then."""
+        if not self.pulls or self.around or self.accounts or self.bends or 0 not in self.walls or self.walls[0]:
+            return
+        self.bends = True
+        del self.walls[0]
+        r, weight = self.r, 2500.0 * self.pick(2.0, 20.0)
+        rigidity = weight * 2e-4 * r / self.dt**2 * (self.pick(4, 10) * r) ** 4
+        self.add(
+            f"FLEXURE wall id 0 rigidity {number(rigidity)} contrast {number(weight)}",
+            f"interval {self.whole(4, 30)}", self.perhaps(40, "left broken"), self.perhaps(30, "right clamped"),
+            self.perhaps(50, "compensated"), self.perhaps(30, f"segments {self.whole(3, 12)}"),
+        )  # fmt: skip
+        if self.chance(50):
+            self.add(f"HIST id 7 interval {self.whole(5, 40)}, deflection")
 
     def do_export(self) -> None:
         self.add(f"EXP part{len(self.lines)}.dat", self.perhaps(50, "group"), self.perhaps(60, self.range()))
@@ -516,7 +596,8 @@ class Maker:
 
 EVENTS = (
     "rain", "delete", "bond", "bond", "prop", "move_a_wall", "delete_a_wall", "break", "fix", "set", "new_wall",
-    "row", "ball", "export", "save", "draw", "clumps", "join", "platens", "log",
+    "row", "ball", "export", "save", "draw", "clumps", "join", "platens", "log", "strain", "surface", "surface",
+    "flexure",
 )  # fmt: skip
 
 
@@ -532,6 +613,9 @@ def _good(maker: Maker) -> Model:
     maker.populate()
     if maker.chance(60):
         maker.do_bond()
+    for chance, event in ((50, "strain"), (15, "surface"), (15, "flexure")):
+        if maker.chance(chance):
+            getattr(maker, f"do_{event}")()
     if maker.chance(40):
         maker.do_move_a_wall()
     maker.run()

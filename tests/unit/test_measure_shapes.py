@@ -82,6 +82,23 @@ def test_driving_wall_is_the_one_that_goes_farthest() -> None:
     assert driving_wall(first, first) is None
     assert driving_wall(first, {**first, -1: ((5.0, 0.0), (5.0, 1.0)), 2: ((8.0, 0.0), (8.0, 1.0))}) == 2
     assert driving_wall(first, {2: first[2]}) is None
+    bent = {**first, 2: ((0.0, 0.0), (0.5, 0.0))}  # the first segment of a base that bends
+    assert driving_wall(first, bent) is None
+
+
+def test_the_floor_follows_a_wall_that_bends() -> None:
+    """Grains on a parabola of twenty segments; without these, the straight line through their lowest points."""
+    rng = np.random.default_rng(1)
+    nodes = np.linspace(0.0, 100.0, 21)
+    sag = -8.0 * nodes / 50.0 * (2.0 - nodes / 50.0)
+    walls = {k: ((nodes[k], sag[k]), (nodes[k + 1], sag[k + 1])) for k in range(20)}
+    x, r = rng.uniform(0.0, 100.0, 4000), np.full(4000, 0.5)
+    y = np.interp(x, nodes, sag) + 0.5 + rng.uniform(0.0, 20.0, 4000)
+    at = np.linspace(2.0, 98.0, 50)
+    assert wedge.floor(x, y, r, walls, 1.5, at) == pytest.approx(np.interp(at, nodes, sag), abs=0.05)
+    assert np.abs(wedge.floor(x, y, r, {}, 1.5, at) - np.interp(at, nodes, sag)).max() > 2.0
+    above = walls | {30: ((-1.0, 45.0), (101.0, 45.0))}
+    assert wedge.floor(x, y - np.interp(x, nodes, sag) + 45.0, r, above, 1.5, at) == pytest.approx(45.0)
 
 
 # --- faults ------------------------------------------------------------------------------------------------------

@@ -178,9 +178,9 @@ def _continue_around(sim: Simulation) -> None:
     """Horizontal walls that span both periodic sides have no end."""
     if not sim.settings.period:
         return
-    w, left = sim.walls, sim.settings.side
+    w, left, rounding = sim.walls, sim.settings.side, periodic_sides.unit(sim)
     low, high = np.minimum(w.p1[:, 0], w.p2[:, 0]), np.maximum(w.p1[:, 0], w.p2[:, 0])
-    w.around |= (w.p1[:, 1] == w.p2[:, 1]) & (low <= left) & (high >= left + sim.settings.period)
+    w.around |= (w.p1[:, 1] == w.p2[:, 1]) & (low <= left + rounding) & (high >= left + sim.settings.period - rounding)
 
 
 def _delete(sim: Simulation, id: int) -> None:

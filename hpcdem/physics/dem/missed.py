@@ -27,8 +27,7 @@ def stop_on_missed(sim: Any) -> None:
     reach = np.full(len(p), 0.5 * sim.rebuild_state.skin)
     rows, at = sim.fast.among(gid)
     reach[rows] = sim.fast.reach[at]
-    around = periodic.travel(sim)[0] if sim.settings.widening else 0.0
-    far = np.flatnonzero(travelled + around + sim.walls.longest_travel() > reach)
+    far = np.flatnonzero(travelled + periodic.travel(sim)[0] + sim.walls.longest_travel() > reach)
     parts = sim.comm.allgather((gid[far].copy(), p.clump[far].copy(), hot[far][:, [X, Y, RADIUS]]))
     theirs, clumps, places = (np.concatenate([part[k] for part in parts]) for k in range(3))
     if period := sim.settings.period:  # those past the sides as well

@@ -88,8 +88,10 @@ def strain(sim: Any, velocity: float) -> None:
 
 
 def widen(sim: Any) -> None:
-    """Move the right side to where it is at the end of this step."""
+    """Move the right side, if it moves, to where it is at the end of this step."""
     s, clock = sim.settings, sim.clock
+    if not s.widening:
+        return
     s.period = float(_rounded(s.length + s.widening * (clock.time + clock.dt - s.since), unit(sim)))
     sim.halo.period = s.period
 
@@ -98,6 +100,8 @@ def travel(sim: Any) -> tuple[float, float]:
     """Return the part of each partner in the approach of a pair across the sides by their motion since the lists were
     built [m], and in a step."""
     s = sim.settings
+    if not s.widening:
+        return 0.0, 0.0
     return 0.5 * abs(s.period - sim.rebuild_state.period), 0.5 * abs(s.widening) * sim.clock.dt
 
 

@@ -196,8 +196,7 @@ class Simulation(Model):
     def _moved(self) -> None:
         if self._walls_move:
             self.walls.move(self.clock.dt)
-        if self.settings.widening:
-            periodic.widen(self)
+        periodic.widen(self)
 
     def _end_step(self, outdated: int) -> None:
         energy, timers = self.energy, self.timers
@@ -249,11 +248,9 @@ class Simulation(Model):
         if broken or max(found[motion.STRIDE], found[5 + fast.FAST_STRIDE]) > guards.LARGEST_STRIDE:
             alone, mixed = self._fast_rows[self.fast.alone[self._fast_at]], self.own_laws.mixed(self.materials.rows)
             guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed, self.comm, alone)
-        path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
-        stride = max(math.sqrt(found[motion.SPEED2]), self.walls.fastest()) * dt
-        if self.settings.widening:
-            sides = periodic.travel(self)
-            path, stride = path + sides[0], stride + sides[1]
+        sides = periodic.travel(self)
+        path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel()) + sides[0]
+        stride = max(math.sqrt(found[motion.SPEED2]), self.walls.fastest()) * dt + sides[1]
         margin = 0.5 * rebuild_state.skin - path
         if glance and not rebuild_state.is_too_late(margin, stride) and found[5 + fast.DUE] == 0.0:
             hurry = found[5 + fast.HURRY]  # half the margin over the stride, of the fast ones
@@ -408,9 +405,7 @@ class Simulation(Model):
 
     def remove(self, which: np.ndarray) -> int:
         """Delete the flagged owned particles (n_own,) bool, clumps as a whole, and all memory of them. The model must
-        be open. Collective.
-
-        Returns how many went, over all ranks.
+        be open. Returns the number over all ranks. Collective.
         """
         gone = np.concatenate(self.comm.allgather(self.particles["gid"][which].copy()))
         if not len(gone):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -99,10 +100,12 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     color = np.asarray(p.get("color", np.zeros(len(gid))), dtype=np.int64)[order]
     names = np.array([*frame.group_names, ""], dtype=object)
     row = np.asarray(p.get("group", np.full(len(gid), -1)), dtype=np.int64)[order]
-    pairs = {name: _pairs(frame, name) for name in tables}
     group = names[np.where((row >= 0) & (row < len(names)), row, len(names) - 1)]
     fixed = held_fast(p, len(gid))[order]
-    found = Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
+    bonds, contacts = (_pairs(frame, name) if name in tables else _no_pairs() for name in ("bonds", "contacts"))
+    found = Grains(
+        frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, bonds, contacts, fixed
+    )
     if not (period := float(frame.settings.get("period", 0.0))):
         return found
     if "laps" not in p:
@@ -178,8 +181,10 @@ def gone(first: Walls, last: Walls, wall: int) -> float:
 
 
 def driving_wall(first: Walls, last: Walls) -> int | None:
-    """Id of the wall whose middle went farthest along x, None where none went."""
-    ways = {i: gone(first, last, i) for i in first if i not in sides_of_box(first)}
+    """Id of the wall whose middle went farthest along x, None where none went. Walls that bend (FLEXURE) become
+    shorter: they do not push."""
+    rigid = [i for i in first if i in last and math.isclose(math.dist(*first[i]), math.dist(*last[i]), rel_tol=1e-6)]
+    ways = {i: gone(first, last, i) for i in rigid if i not in sides_of_box(first)}
     wall = max(ways, key=lambda i: ways[i], default=None)
     return wall if wall is not None and ways[wall] > 0.0 else None
 

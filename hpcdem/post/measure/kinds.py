@@ -146,9 +146,8 @@ def faults_part(scene: Scene) -> Faults | None:
     if request.over_time and request.strain is None:
         threshold = max(TIMES_MEAN * float(np.nanmean(np.abs(field))), LEAST_STEP)
     skin = request.skin if request.skin is not None else SKIN * cell
-    rise, height = wedge.base(now.x, now.y, now.r, now.walls, cell, float(now.x.min()), float(now.x.max()))
     shortest = request.length if request.length is not None else SHORTEST * cell
-    low = height + rise * x + skin
+    low = wedge.floor(now.x, now.y, now.r, now.walls, cell, x) + skin
     if np.isfinite(face := plan.face(now)):
         low = np.where(plan.forward * (x - face) < skin, np.inf, low)
     picked = faults.bands(x, y, field, threshold, shortest, low[None, :])

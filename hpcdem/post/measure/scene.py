@@ -122,7 +122,7 @@ class Plan:
         return face_of_row(g, self.row, self.forward) if len(self.row) else float("nan")
 
     def shortening(self, g: Grains) -> float:
-        """Return the displacement of the pushing wall or row, or the approach of periodic sides [m]; NaN without them."""
+        """Return the displacement of what pushes, or the approach of periodic sides [m]; NaN without both."""
         if self.period:
             return self.period - g.period
         return self.forward * (self.face(g) - self.start)

@@ -107,6 +107,30 @@ def shape(x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float
     return Shape(found, back, float(top - (height + rise * found.crest[0])), found.toe[0] - back, slope)
 
 
+def floor(x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, at: np.ndarray) -> np.ndarray:
+    """Height of the base (m,) [m] at positions (m,) [m]: of the wall of several segments on which the grains lie, as
+    FLEXURE makes one, otherwise of the straight base below all grains; see `base`.
+
+    Segments are flatter than 45 degrees and at most one column away from the lowest grain of their column.
+    """
+    left, right = float(x.min()), float(x.max())
+    rise, height = base(x, y, r, walls, cell, left, right)
+    heights = height + rise * at
+    px, py = surface(x, r - y, cell)
+    lowest = np.interp(at, px, -py)
+    found = np.full(len(at), np.nan)
+    for (x1, y1), (x2, y2) in walls.values():
+        if abs(x2 - x1) <= abs(y2 - y1) or (min(x1, x2) <= left and max(x1, x2) >= right):
+            continue
+        here = y1 + (y2 - y1) / (x2 - x1) * (at - x1)
+        near = (at >= min(x1, x2)) & (at <= max(x1, x2)) & (np.abs(here - lowest) <= cell)
+        found[near] = np.fmin(found[near], here[near])
+    some = np.isfinite(found)
+    if some.mean() > 0.5:
+        heights = np.interp(at, at[some], found[some])
+    return heights
+
+
 def base(
     x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, left: float, right: float
 ) -> tuple[float, float]:

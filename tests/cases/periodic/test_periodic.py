@@ -371,6 +371,21 @@ def test_what_cannot_act_is_refused(tmp_path):
         cycles.cycle(sim, 1)
 
 
+@pytest.mark.parametrize("left", [-137.3517, 0.1, 1234.567])
+def test_a_floor_with_the_ends_of_the_sides_spans_them(tmp_path, left):
+    """Although the sides are rounded, some away from its ends."""
+    for first in (True, False):
+        sim = model(tmp_path)
+        for k, right in enumerate(left + np.linspace(1.1, 97.3, 41)):
+            sim.clear()
+            if first:
+                walls.wall(sim, 7, ((left, 0.0), (right, 0.0)))
+            walls.periodic(sim, (left, right))
+            if not first:
+                walls.wall(sim, 7, ((left, 0.0), (right, 0.0)))
+            assert sim.walls.around.tolist() == [True], k
+
+
 def test_surface_processes_are_refused(tmp_path):
     sim = gas(tmp_path)
     surface.surface(sim, 1, interval=10, erode=0.1, above=1.0)
