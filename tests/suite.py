@@ -36,7 +36,7 @@ EVERY = 60.0
 BUDGET = 120.0
 """Seconds by the clock that the tests of a change may take."""
 
-HOW = ("slow", "nightly")
+HOW = ("nightly", "slow")
 """Marks of tests that a run leaves out unless it is asked for them by an option of this name."""
 
 

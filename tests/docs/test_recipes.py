@@ -476,7 +476,8 @@ def test_the_places_exist() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in RECIPES]
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow, pytest.mark.nightly] * (name not in QUICK)) for name in RECIPES],
 )
 def test_a_recipe_is_complete(tmp_path: Path, name: str) -> None:
     recipe, package = RECIPES[name], copy_of_the_package(tmp_path)
