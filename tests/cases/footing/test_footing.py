@@ -110,10 +110,9 @@ def test_cohesive_soil(rough):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rough", [True, False])
-def test_smaller_elements(rough):
+def test_smaller_elements():
     """Within 3 % even of the footing alone."""
-    found = pushed(32, rough)
+    found = pushed(32, True)
     want = exact.pressure(COHESION, 0.0, 0.0)
     assert found.pressure == pytest.approx(want, rel=0.015) and found.bare == pytest.approx(want, rel=0.03)
 
