@@ -34,7 +34,9 @@ def test_a_short_fracture_on_a_coarse_mesh(resident, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("given", [{}, RING, THICK], ids=["toughness", "K_Ic", "viscosity"])
+@pytest.mark.parametrize(
+    "given", [{}, pytest.param(RING, marks=pytest.mark.nightly), THICK], ids=["toughness", "K_Ic", "viscosity"]
+)
 def test_the_closed_forms(resident, tmp_path, given):
     """Length 3 %, opening 2 %, net pressure 5 %, means over the last fifth."""
     done = results(resident, tmp_path, HydraulicFracture(**given), timeout=7200.0)
