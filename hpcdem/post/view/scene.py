@@ -60,6 +60,10 @@ CATEGORIES = (
 """Of groups: ten that colour-blind readers distinguish (Tol 2021, with three more)."""
 PALE = ("#77aadd", "#eedd88", "#ee8866", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff", "#aaaa00")
 """Colours of groups of elements, on which joints and bolts are visible (Tol 2021, light)."""
+TRACES = (
+    "#08306b", "#7f0000", "#00441b", "#4a1486", "#7a3b00", "#004d56", "#8e0152", "#252525", "#5a5200", "#3f007d",
+)  # fmt: skip
+"""Of faults: dark, so that their lines are visible on discs and elements coloured by groups."""
 CLASSES = 12
 """Largest number of entries in the legend of an integer field with names."""
 
@@ -489,7 +493,7 @@ def _by_field(result: Painted, objects: Objects, moment: Moment) -> None:
     values = _of(np.asarray(objects.values(layer.field, layer.object)), result.rows)
     names = objects.names.get(layer.field)
     if names and layer.span is None:
-        _by_name(result, values, names)
+        _by_name(result, values, names, TRACES if layer.object == "faults" else CATEGORIES)
         return
     low, high = layer.span or _span(values, layer)
     values = values.astype(float, copy=False)
