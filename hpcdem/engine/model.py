@@ -25,7 +25,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.core.timers import Timers
 from hpcdem.engine.rebuild import AT_A_GLANCE, RebuildState
-from hpcdem.halo.exchange import connect
+from hpcdem.halo.exchange import Sends, connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 
@@ -66,6 +66,8 @@ class Model(ABC):
     closed: bool
     moves_as_one = False
     """Rows are moved in one piece."""
+    moves_ghosts = False
+    """A rank moves its ghosts too, with velocities that it gets: positions are not sent."""
 
     def __init__(
         self,
@@ -122,6 +124,12 @@ class Model(ABC):
                 halo.start()
                 self._move_rows(*halo.inside)
             self._moved()
+        if self.moves_ghosts:
+            with timers("halo"):
+                halo.finish()
+            with timers("move"):
+                self._move_rows(-halo.n_left, 0)
+                self._move_rows(halo.n_own, halo.n_own + halo.n_right)
         state.age += 1
         if due := state.passed():
             with timers("reduce"):
@@ -153,7 +161,7 @@ class Model(ABC):
 
     @abstractmethod
     def _move_rows(self, first: int, last: int) -> None:
-        """Move the owned rows first : last by dt. Not collective."""
+        """Move the rows first : last by dt, counted from the first owned one. Not collective."""
 
     @abstractmethod
     def _moved(self) -> None:
@@ -250,12 +258,9 @@ class Model(ABC):
                 at += part.shape[1]
             return owned[0].view(np.int64)[:, 0].copy(), histories.take(stay).joined(counts, entries), owned[1:]
 
-    def _connect(
-        self, rows: np.ndarray, order: np.ndarray, cell: np.ndarray, columns: int = 1, boxes: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Make the storage of rows[order] with ghosts, which a new halo keeps current; columns, boxes: which rows of
-        neighbours are copied, see `Ownership.sends`. Collective."""
-        sends = self.ownership.sends(cell, columns, boxes)
+    def _connect(self, rows: np.ndarray, order: np.ndarray, sends: Sends) -> np.ndarray:
+        """Make the storage of rows[order] with ghosts, which a new halo keeps current; sends: which rows others copy,
+        see `Ownership.sends`. Collective."""
         around = self.ownership.period, self.ownership.widening
-        storage, self.halo = connect(self.comm, rows, order, sends, self.threads, *around)
+        storage, self.halo = connect(self.comm, rows, order, sends, self.threads, *around, keep=not self.moves_ghosts)
         return storage

@@ -36,17 +36,23 @@ class Halo:
 
     n_left, n_right: number of ghosts before and after the owned rows. border: rows that are sent, as ranges of owned
     rows; inside: the other rows. If the border moves before `start`, the messages travel while the inside moves.
-    images: owned rows (ranges) that are sent past an end of a periodic model.
+    images: owned rows (ranges) that are sent past an end of a periodic model. followers: exchanges that are freed with
+    this one.
     """
 
-    def __init__(self, comm: Comm, n_own: int, sends: Sends, period: float = 0.0, widening: float = 0.0) -> None:
+    def __init__(
+        self, comm: Comm, n_own: int, sends: Sends, period: float = 0.0, widening: float = 0.0, behind: bool = False
+    ) -> None:
         """sends: rows for each rank with which this one exchanges ghosts, by ascending rank. Both ranks list each
         other; either may send nothing. period [m]: length of a periodic model; ghosts from past its ends are images,
         moved by it in the first column of rows that hold positions; widening [m/s]: its rate, by which images of rows
-        that hold velocities, x in their third column, are faster. Collective among them."""
+        that hold velocities, x in their third column, are faster. behind: all ghosts follow the owned rows. Collective
+        among them."""
         self.comm, self.n_own, self.period, self.widening = comm, n_own, period, widening
         self.requests: list = []
         self.more: list = []
+        self._under_way = False
+        self.followers: list[Halo] = []
         self._packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._more_packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._copied: list[tuple[np.ndarray, slice, slice | np.ndarray]] = []
@@ -58,7 +64,7 @@ class Halo:
         else:
             arriving = np.zeros_like(counts)
             self._swap((number, arriving[k : k + 1], counts[k : k + 1]) for k, number in enumerate(sends))
-        before = np.array(list(sends), np.int64) < comm.rank
+        before = np.array(list(sends), np.int64) < (-1 if behind else comm.rank)
         self.n_left, self.n_right = int(arriving[before].sum()), int(arriving[~before].sum())
         ends = np.cumsum(arriving) + np.where(before, 0, n_own)
         self._pieces = [
@@ -102,6 +108,13 @@ class Halo:
         tags = (tag, tag + ONWARDS) if number > self.comm.rank else (tag + ONWARDS, tag)
         return number % self.comm.size, *tags
 
+    def owners(self) -> np.ndarray:
+        """Return the rank that owns each row of the storage (n,)."""
+        out = np.full(self.n_left + self.n_own + self.n_right, self.comm.rank)
+        for number, to, _ in self._pieces:
+            out[to] = number % self.comm.size
+        return out
+
     def add_ghost_field(self, rows: np.ndarray, speeds: bool = False) -> None:
         """Include this array in `refresh`; its memory must not move. speeds: it begins with x, y and the velocity along
         x."""
@@ -136,6 +149,7 @@ class Halo:
 
     def start(self) -> None:
         """Begin to renew the ghosts. Until `finish`, rows of `border` must not change and ghosts must not be read."""
+        self._under_way = True
         if self.requests:
             _pack(self._packed)
             self.comm.start_all(self.requests)
@@ -143,7 +157,10 @@ class Halo:
             rows[to] = rows[sent]
 
     def finish(self) -> None:
-        """Wait until ghosts have the state that the owners had at `start`."""
+        """Wait until ghosts have the state that the owners had at `start`, unless it was waited for already."""
+        if not self._under_way:
+            return
+        self._under_way = False
         if self.requests:
             self.comm.wait_all(self.requests)
         for rows in self._places:
@@ -163,6 +180,8 @@ class Halo:
 
     def close(self) -> None:
         """Free the requests of MPI."""
+        for follower in self.followers:
+            follower.close()
         for request in self.requests + self.more:
             request.Free()
         self.requests, self.more = [], []
@@ -203,13 +222,15 @@ def _border(n: int, sends: Sends) -> tuple[list[tuple[int, int]], tuple[int, int
 
 def connect(
     comm: Comm, hot: np.ndarray, order: np.ndarray, sends: Sends, threads: int, period: float = 0.0,
-    widening: float = 0.0,
+    widening: float = 0.0, keep: bool = True,
 ) -> tuple[np.ndarray, Halo]:  # fmt: skip
-    """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it current; sends: of
-    these rows; period, widening: see `Halo`. Where there is a period, rows begin with x, y and the velocity along x."""
+    """Make the storage with ghosts for the owned rows hot[order] (n, w), and the halo, which keeps it current unless
+    `keep` is False; sends: of these rows; period, widening: see `Halo`. Where there is a period, rows begin with x, y
+    and the velocity along x."""
     halo = Halo(comm, len(order), sends, period, widening)
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
     halo.fill(storage, speeds=True)
-    halo.add_ghost_field(storage, speeds=True)
+    if keep:
+        halo.add_ghost_field(storage, speeds=True)
     return storage, halo

@@ -12,8 +12,9 @@ from hpcdem.core.comm import SerialComm
 from hpcdem.core.errors import UsageError
 from hpcdem.halo.exchange import Halo
 from hpcdem.halo.ownership import Curve
-from hpcdem.physics.fdem import changes, saved_state
+from hpcdem.physics.fdem import changes, overlaps, saved_state
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.models import COHESIVE
 from tests.pretended import Pretended, Ranks
@@ -126,18 +127,64 @@ def test_bodies_without_joints_collide_to_the_same_bits(any_cuts: None) -> None:
     assert touching > 3 and together([part for part, _ in parts]) == alone
 
 
-def test_a_model_without_joints_has_fewer_ghosts() -> None:
-    def ghosts(comm: Pretended, joints: bool) -> int:
-        sim = Blocks(comm)
-        sim.take_mesh(box((8, 8, 8), (1.0, 1.0, 1.0), shaken=0.2))
-        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
-        if joints:
-            sim.joint_model(None, COHESIVE, WEAK)
-        sim.close_model()
-        return len(sim.number) - sim.n_own
+def faulted(comm: Any) -> Blocks:
+    """A cube with joints on the plane in its middle, whose halves are torn apart."""
+    sim, mesh = Blocks(comm), box((8, 6, 6), (1.0, 0.8, 0.8))
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "friction": 30.0})
+    joints = sim.numbers_of_joints(None)
+    middle = (np.abs(mesh.points[mesh.face_points(joints)][:, :, 0] - 0.5) < 1e-9).all(axis=1)
+    sim.joint_model(joints[middle], COHESIVE, WEAK)
+    changes.set_velocity(sim, np.flatnonzero(mesh.points[:, 0] < 0.4), -6.0, 0.0, 0.0)
+    return sim
 
-    few, many = (sum(Ranks(4).run(lambda comm, of=joints: ghosts(comm, of))) for joints in (False, True))
-    assert 0 < few < 0.9 * many
+
+def test_a_fault_breaks_to_the_same_bits(any_cuts: None) -> None:
+    """Away from it elements have no joints, so that a rank has forces of its neighbours' elements only."""
+
+    def torn(comm: Any) -> tuple[dict, int]:
+        sim = faulted(comm)
+        return run(sim, 40), len(sim.event_rows)
+
+    (alone, cracks), parts = torn(SerialComm()), Ranks(6).run(torn)
+    assert cracks > 5 and together([part for part, _ in parts]) == alone
+
+
+@pytest.mark.parametrize("collision", [True, False])
+def test_ghosts_are_at_the_surface_and_at_joints(collision: bool) -> None:
+    def held(comm: Pretended) -> tuple[int, int]:
+        sim = faulted(comm)
+        sim.option(collision=collision)
+        sim.step()
+        mesh, own = sim.the_mesh(), sim.owned
+        ghosts = np.delete(sim.number, np.arange(own.start, own.stop))
+        points = mesh.points[mesh.cells[ghosts]]
+        there = np.abs(points[..., 0] - 0.5) < 1e-9
+        if collision:
+            there |= ((points < 1e-9) | (points > (1.0 - 1e-9, 0.8 - 1e-9, 0.8 - 1e-9))).any(axis=2)
+        assert there.any(axis=1).all() and not len(sim.beyond.number)
+        of_others = np.setdiff1d(sim.local.nodes.wanted // 4, ghosts)
+        assert len(sim.x) == len(sim.number) == sim.n_own + len(ghosts)
+        return len(ghosts), len(of_others)
+
+    found = Ranks(6).run(held)
+    assert all(ghosts > 0 and others > 0 for ghosts, others in found)
+
+
+def test_overlaps_in_the_inside_of_bodies_of_other_ranks_are_found() -> None:
+    def overlaps_of(comm: Any) -> tuple[list, int]:
+        lower, upper = box((6, 6, 6), (1.0, 1.0, 1.0)), box((3, 3, 3), (0.5, 0.5, 0.5))
+        points = np.concatenate([lower.points, upper.points + (0.23, 0.26, 0.24)])
+        sim = Blocks(comm)
+        sim.take_mesh(Mesh.of(points, np.concatenate([lower.cells, upper.cells + len(lower.points)])))
+        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+        sim.close_model()
+        found = overlaps.deepest(sim, sim.local)
+        inside = Surface.of(sim).first[found[:, -2].astype(np.int64)] < 0
+        return found.tolist(), int(inside.sum())
+
+    (alone, inside), parts = overlaps_of(SerialComm()), Ranks(5).run(overlaps_of)
+    assert inside > 20 and all(found == alone for found, _ in parts)
 
 
 def test_ghosts_are_those_near_the_piece() -> None:

@@ -54,7 +54,9 @@ def test_joints_and_ghosts_of_the_curve_take_memory():
     said, plain = (check.memory(text, "a.py", 16, 16, None) for text in (jointed, BOX))
     each, with_joints = footprint.expected(6_000_000, 3, 16, 16), footprint.expected(6_000_000, 3, 16, 16, True)
     assert f"{with_joints.rank * 1e-6:.0f} MB per rank" in said and f"{each.rank * 1e-6:.0f} MB per rank" in plain
-    assert with_joints.rank - each.rank == pytest.approx(footprint.OF_JOINTS * 6e6 / 16)
+    share = 6e6 / 16
+    more = (footprint.GHOST[True] - footprint.GHOST[False]) * footprint.ghosts(share, 16)
+    assert with_joints.rank - each.rank == pytest.approx(footprint.OF_JOINTS * share + more)
     assert footprint.ghosts(1e6, 1) == 0.0
     shares = [footprint.ghosts(1e6 / ranks, ranks) * ranks for ranks in (2, 4, 16, 64)]
     assert shares == sorted(shares) and 1.5 < shares[3] / shares[2] < 3.0

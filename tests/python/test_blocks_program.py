@@ -651,7 +651,7 @@ WRONG = {
     "three cells": ("sim.mesh.structured((0, 0), (1, 1), (4, 4, 4))", "cells: expected 2 values"),
     "point in space": ("sim.geometry.circle((0, 0, 0), 1, 'l')", r"centre: expected a vector \(x,y\), got \(0, 0, 0\)"),
     "text for a list": ("sim.mesh.create('o', 1.0, hole='abc')", "hole: expected a list of values, got 'abc'"),
-    "too much to refine": ("sim.mesh.create('o', 1.0, refine_layer=[('h', 1, 2, 3)])", "expected size, distance besi"),
+    "too much to refine": ("sim.mesh.create('o', 1.0, refine_layer=[('h', 1, 2, 3)])", "expected size, distance in"),
     "size left out": ("sim.mesh.create('o', 1.0, refine_layer=['h'])", "mesh.create: refine_layer needs size"),
     "no points": ("sim.geometry.polygon([], 'l')", r"points: expected vectors \(x,y\), got none"),
     "set without groups": ("sim.mesh.glue(set='d')", "mesh.glue: set needs between"),

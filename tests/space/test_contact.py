@@ -276,8 +276,8 @@ def test_all_pairs_are_found() -> None:
     assert set(found) == brute_force(sim, skin)
     number = sim.number >= 8 * 3 * 2 * 6
     sim.x.reshape(-1, 4, 4)[number, :, 2] -= 0.499 * skin
-    everything = AllPairs(sim)
-    deep = np.flatnonzero(everything.depths(sim)[:, 0] > 0.0)
+    (everything,) = AllPairs.of(sim)
+    deep = np.flatnonzero(everything.depths()[:, 0] > 0.0)
     faces, elements = everything.face[everything.first[deep]], everything.element[everything.second[deep]]
     touching = set(zip(faces.tolist(), elements.tolist()))
     assert len(touching) > 20 and touching <= set(found)

@@ -382,3 +382,28 @@ def test_petsc_finds_the_same(with_joints):
     found = equilibrium.solve_elastic(other, solver="petsc")
     assert found.solver.startswith("PETSc (CG" if not with_joints else "PETSc")
     assert farthest(other, one) < 1e-9
+
+
+@pytest.mark.skipif(not linear.petsc_there(), reason="petsc4py is missing")
+@pytest.mark.parametrize(("limit", "levels"), [(None, 2), (50, 3)])
+def test_multigrid_has_few_levels_unless_an_option_of_petsc_asks_for_more(monkeypatch, limit, levels):
+    from petsc4py import PETSc
+
+    name, found, solve = "pc_gamg_coarse_eq_limit", [], linear.Petsc.solve
+
+    def noted(self, *args):
+        found.append(self._ksp.getPC().getMGLevels())
+        return solve(self, *args)
+
+    monkeypatch.setattr(linear.Petsc, "solve", noted)
+    sim = body(box((10, 10, 10), (1.0, 1.0, 1.0)), dynamic=False)
+    sim.velocity_condition(nodes_on(sim.mesh, "bottom"), vx=0.0, vy=0.0, vz=0.0)
+    sim.gravity(0.0, 0.0, -9.81)
+    if limit is not None:
+        PETSc.Options().setValue(name, limit)
+    try:
+        equilibrium.solve_elastic(sim, solver="petsc")
+        assert PETSc.Options().hasName(name) == (limit is not None)
+    finally:
+        PETSc.Options().delValue(name)
+    assert set(found) == {levels}

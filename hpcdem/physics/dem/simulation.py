@@ -374,7 +374,7 @@ class Simulation(Model):
 
     def _store(self, order: np.ndarray, cell: np.ndarray) -> None:
         p = self.particles
-        storage = self._connect(p.hot, order, cell, self.rebuild_state.columns)
+        storage = self._connect(p.hot, order, self.ownership.sends(cell, self.rebuild_state.columns))
         rigid = self.clumps.storage(p, order, self.halo, self.threads)
         more = self.halo.storage(p.more[order]) if p.extra else np.empty((len(storage), 0))
         cold = take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads)

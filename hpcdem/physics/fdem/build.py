@@ -208,34 +208,39 @@ def special_nodes(number, n_left, n_own, corner_special, node, begin, low, local
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_nodes(
-    corner_of, start, one, member, where, cells, width, force_width, stride, mass, begin, corner, place, again, out_mass
-):
+def place_nodes(corner_of, start, one, member, where, cells, width, force_width, stride, begin, corner, place, again):
     """Find the positions of the corners of special nodes in the tables: in the forces (n, force_width), in v (n,
     width), a second position in v, or -1; stride: words from one corner of a row to the next.
 
-    Returns a corner whose element is not held by this rank, or -1.
+    Returns a corner c whose element is not held by this rank, or -1; its position in the forces is -1 - c.
     """
     lost = np.int64(-1)
     for i in range(len(corner_of)):
         begin[i + 1] = begin[i] + one[i]
-        total = 0.0
         for m in range(one[i]):
             c = corner_of[i] if start[i] < 0 else member[start[i] + m]
             r, k = where[c // 4], c % 4
             at = begin[i] + m
             if r < 0:
                 lost = c
-                corner[at] = place[at] = 0
-                again[at] = -1
+                corner[at], place[at], again[at] = -1 - c, 0, -1
                 continue
             n = 4 if cells[c // 4, 3] >= 0 else 3
             corner[at], place[at], again[at] = force_width * r + stride * k, width * r + stride * k, -1
             if width == 12 and k < 2:
                 again[at] = width * r + 2 * (n + k)
-            total += mass[r, k]
-        out_mass[i] = total
     return lost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weigh(begin, corner, stride, mass, out):
+    """Masses of special nodes, sums of those of their corners: mass (4 n,), of which corner / stride is that of a
+    corner."""
+    for i in range(len(out)):
+        total = 0.0
+        for m in range(begin[i], begin[i + 1]):
+            total += mass[corner[m] // stride]
+        out[i] = total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -230,8 +230,7 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
     begin, corner_at = local.nodes.pulled
     if len(corner_at):
         node = np.repeat(np.arange(len(begin) - 1), np.diff(begin))
-        row, k = corner_at // local.force_width, corner_at % local.force_width // local.stride
-        number = sim.number[row]
+        number, k = np.divmod(local.nodes.code_of(corner_at), 4)
         dies = dying[number]
         heir = np.full(len(begin) - 1, np.iinfo(np.int64).max)
         np.minimum.at(heir, node[~dies], 4 * number[~dies] + k[~dies])
@@ -240,7 +239,7 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
         at = sim.where[heir[known] // 4]
         mine[known] = (at >= sim.owned.start) & (at < sim.owned.stop)
         use = dies & mine[node]
-        flat = seen.force.reshape(-1)
+        flat = seen.at_corners.reshape(-1)
         force = flat[corner_at[use][:, None] + np.arange(dim)]
         parts.append((heir[node[use]], 4 * number[use] + k[use], force))
     # Joints: the forces on this side.

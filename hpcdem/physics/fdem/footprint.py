@@ -10,8 +10,9 @@ OWN = {2: 650.0, 3: 660.0}
 """Memory of an owned element, by dimensions [B], in space without joints."""
 OF_JOINTS = 140.0
 """More of an element in space with joints before their peak [B]."""
-GHOST = 650.0
-"""Memory of a ghost in space, with that of its exchange [B]; in the plane ghosts are few."""
+GHOST = {False: 320.0, True: 470.0}
+"""What ranks in space have beyond their even share, per ghost of `ghosts`, without and with joints [B]: ghosts, forces
+of other ranks, contacts on both sides and their exchange; in the plane these are few."""
 LAYER = 1.75
 """Thickness of the ghosts around a piece of the curve, in sides of a cube of six tetrahedra."""
 NODE = {2: 205.0, 3: 230.0}
@@ -45,7 +46,7 @@ def expected(elements: int, dim: int, ranks: int, here: int, joints: bool = Fals
     each = elements / ranks
     own, shared = each * OWN[dim], elements * NODE[dim]
     if dim == 3:
-        own += each * OF_JOINTS * joints + GHOST * ghosts(each, ranks)
+        own += each * OF_JOINTS * joints + GHOST[joints] * ghosts(each, ranks)
     again = REBUILDING[dim] * own
     most = max(here * again, elements * MAKING)
     return Footprint(EMPTY + own, EMPTY + again, shared, here * EMPTY + shared + most)

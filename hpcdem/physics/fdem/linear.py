@@ -20,6 +20,9 @@ MANY = 400_000
 """Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
 MANY_IN_SPACE = 20_000
 """Unknowns from which PETSc is used in space, where factors fill up sooner."""
+COARSEST = 1500
+"""Unknowns up to which multigrid solves its coarsest grid directly: more levels, as by default of PETSc (50), need more
+iterations, and the more the more ranks there are."""
 CONDENSED = 2000
 """Largest number of unknowns of joints and fluid for dense matrices."""
 SINGULAR = (
@@ -362,10 +365,8 @@ class Petsc:
             self.name = "PETSc (CG, multigrid)"
             ksp.setType("cg")
             ksp.setTolerances(rtol=1e-10, max_it=2000)
-            pc.setType("gamg")
             self._matrix.setOption(self._petsc.Mat.Option.SYMMETRIC, True)
-            self._matrix.setNearNullSpace(self._rigid())
-            ksp.setFromOptions()  # else multigrid has no defaults
+            self._make_multigrid(ksp)
         elif self._mumps:
             ksp.setType("preonly")
             pc.setType("lu")
@@ -374,9 +375,7 @@ class Petsc:
             ksp.setType("gmres")
             ksp.setGMRESRestart(100)
             ksp.setTolerances(rtol=1e-10, max_it=2000)
-            pc.setType("gamg")
-            self._matrix.setNearNullSpace(self._rigid())
-            ksp.setFromOptions()
+            self._make_multigrid(ksp)
         try:
             ksp.setUp()
             failed = False
@@ -384,6 +383,17 @@ class Petsc:
             failed = True
         if self.comm.any(failed):
             raise CommandError(SINGULAR)
+
+    def _make_multigrid(self, ksp: Any) -> None:
+        options, name = self._petsc.Options(), "pc_gamg_coarse_eq_limit"
+        ours = not options.hasName(name)
+        if ours:
+            options.setValue(name, COARSEST)
+        ksp.getPC().setType("gamg")
+        self._matrix.setNearNullSpace(self._rigid())
+        ksp.setFromOptions()  # else multigrid has no defaults
+        if ours:
+            options.delValue(name)
 
     def _rigid(self) -> Any:
         """Make the near null space: the translations, in space rotations, too. (Multigrid for elasticity needs to know

@@ -34,11 +34,14 @@ def tractions_now(sim: State, placed: Placed, time: float) -> np.ndarray:
 
 class Loads:
     """special (n_own, 4) bool: corners that may get such a force; some: there are any, on some rank; applied (n or 1,
-    w): the forces in rows of storage [N/m], in space [N], w words a row.
+    w): the forces in rows of storage [N/m], in space [N], w words a row, of at_corners, see `NodeSet.table`.
 
     element, corner: of the m loaded faces the how-manieth owned element, and where their corners begin in `applied`
     (m, dim); functions, of: rows of the table of tractions; quiet: which of these faces act as quiet ones.
     relaxing_corner: where forces that die down begin in `applied`."""
+
+    at_corners: np.ndarray
+    applied: np.ndarray
 
     def __init__(self, sim: State, width: int, stride: int) -> None:
         self.sim, self.width = sim, width
@@ -61,7 +64,6 @@ class Loads:
         dies_down = self._make_relaxations(stride)
         sim.surface_loads.corners(sim, self.special)
         self.some = bool(sim.surface_loads) or sim.comm.any(len(self.element) > 0 or dies_down)
-        self.applied = np.zeros((len(sim.number) if self.some else 1, width))
 
     def _acting(self, quiet: np.ndarray) -> np.ndarray:
         """Return the quiet faces that act: all, or none in static runs, which is reported."""
@@ -105,7 +107,7 @@ class Loads:
         if not self.some:
             return
         sim, applied = self.sim, self.applied
-        applied[:] = 0.0
+        self.at_corners[:] = 0.0
         self._push(tractions_now(sim, self.functions, sim.time_now()))
         if len(self.relaxing_corner):
             now = np.where(self._in_steps, float(sim.clock.step), sim.clock.time)

@@ -37,12 +37,14 @@ if TYPE_CHECKING:
 class Evaluation:
     """Forces at the present positions, as the next step will see them [N/m].
 
-    force (n, 8): on the corners of the owned elements, in storage order (ghosts too, where nodes are shared); of_joints
-    (n, 8): those of them from joints; pushed: those from contact, by `pairs.rows`; touching (m,), pair_force (m, 12):
-    by pairs; outside, felt: of special nodes, see nodes.py.
+    force (n, 8): on the corners of the owned elements, in storage order; at_corners: these, then those of other ranks'
+    elements at common nodes, see `NodeSet.table`; of_joints (n, 8): those of them from joints; pushed: those from
+    contact, by `pairs.rows`; touching (m,), pair_force (m, 12): by pairs; outside, felt: of special nodes, see
+    nodes.py.
     """
 
     force: np.ndarray
+    at_corners: np.ndarray
     of_joints: np.ndarray
     pushed: np.ndarray
     touching: np.ndarray
@@ -184,9 +186,9 @@ class Local(JointTables):
             special[self.whole.rows - sim.n_left] = True
         self.nodes = NodeSet(sim, special, self.force_width, self.stride)
         self.outside, self.felt = self.nodes.outside, self.nodes.felt
-        self._agree_on_lost(self.nodes.find_corners(self.true_mass), "the node of corner")
+        self._agree_on_lost(self.nodes.find_corners(), "the node of corner")
         self.moves_nodes = self.nodes.some or self.nodes.shared
-        self.force = np.zeros((len(sim.number) if self.moves_nodes else 1, self.force_width))
+        self.at_corners, self.force = self.nodes.tables(self.loads, self.moves_nodes)
         self.triangle_special = special[self.triangle_rows[: self.count] - sim.n_left].any(axis=1)
         self.block_special = self._per_block(self.triangle_special)
 
@@ -287,7 +289,7 @@ class Local(JointTables):
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
-        self.nodes.move(self.force, self.loads)
+        self.nodes.move(self.at_corners, self.loads)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -298,8 +300,8 @@ class Local(JointTables):
         changed = sim.v, self.outside, self.felt, *pairs.changed_by_forces(), *self.solids.changing()
         kept = [(table, table.copy()) for table in changed]
         with self.joints_kept():
-            stored = self.force
-            self.force, of_joints = np.zeros((total, self.force_width)), np.zeros((total, self.force_width))
+            stored = self.at_corners, self.force
+            (self.at_corners, self.force), of_joints = self.nodes.table(), np.zeros((total, self.force_width))
             if not contact:
                 pairs.pushed[:] = 0.0
             elif len(pairs):
@@ -307,10 +309,10 @@ class Local(JointTables):
             self._fill(self.force, of_joints, True)
             self.move_nodes()
             found = Evaluation(
-                self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
+                self.force, self.at_corners, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
                 self.outside.copy(), self.felt.copy(), sim.v.copy(),
             )  # fmt: skip
-            self.force = stored
+            self.at_corners, self.force = stored
         for table, values in kept:
             table[...] = values
         return found

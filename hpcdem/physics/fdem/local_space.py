@@ -132,10 +132,11 @@ class LocalSpace(Local):
         self.loads = LoadsSpace(sim, self.force_width, self.stride, self.hexes)
         self.nodes = nodes = NodeSetSpace(sim, self.loads.special, self.force_width, self.stride)
         self.outside, self.felt = nodes.outside, nodes.felt
-        self._agree_on_lost(nodes.find_corners(self.true_mass), "the node of corner")
+        self._agree_on_lost(nodes.find_corners(), "the node of corner")
         if self.hexes is not None:
             nodes.pull(self.true_mass)
-        self.force, self.moves_nodes = np.zeros((len(sim.number), self.force_width)), True
+        self.moves_nodes = True
+        self.at_corners, self.force = self.nodes.tables(self.loads, True)
 
     def _set_kicks(self, dt: float) -> None:
         mass, alone = self.masses.of_motion[self.sim.owned], self.nodes.alone
@@ -187,7 +188,7 @@ class LocalSpace(Local):
         if self.some_alone:
             alpha = 0.0 if sim.options.dynamic else ALPHA
             space.kick.on(sim.threads)(sim.threads, sim.n_left, self.kick, self.force, sim.v, alpha)
-        self.nodes.move(self.force, self.loads)
+        self.nodes.move(self.at_corners, self.loads)
 
     def stresses(
         self, at: np.ndarray | None = None, energies: bool = True, flow: bool = True

@@ -85,8 +85,6 @@ class Masses:
                     sim.rebuild_state.estimated = sim.clock.step
                     sim.report_time_step(sim.rebuild_state.dt, critical, self.added() if o.mass_scaling > 0.0 else 0.0)
             sim.clock.dt = sim.rebuild_state.dt
-        if sim.comm.size > 1:
-            sim.halo.fill(mass)
 
     def added(self) -> float:
         """Mass that mass scaling has added, over the true mass. Collective."""

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcdem.core.memory import sparse_zeros
+from hpcdem.halo.exchange import Halo
 from hpcdem.numerics.on_threads import OnThreads
-from hpcdem.physics.fdem import build
+from hpcdem.physics.fdem import build, ghosts
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.user_functions import Placed
@@ -47,12 +49,17 @@ class NodeSet:
     """special (n_own, 4) bool: corners of owned elements at these nodes, there are `some`; shared: some have corners of
     other ranks. width: words of a row of forces; stride: from one corner of a row to the next.
 
-    lead (n,): a corner, element * 4 + k, of each; begin (n + 1,), corner, place, again: see `build.place_nodes`; mass
-    (n,); kick: dt / mass; condition, share: rows of the table of conditions and the part of its force, where other
+    lead (n,): a corner, element * 4 + k, of each; begin (n + 1,), corner, place, again: see `build.place_nodes`, but
+    corners of other ranks' elements, wanted (w,), have forces behind those of the rows of storage, which `halo` renews;
+    mass (n,); kick: dt / mass; condition, share: rows of the table of conditions and the part of its force, where other
     ranks' elements are at the node; outside (n, dim), felt (n, 2 dim): forces from outside, and all."""
 
     kick: np.ndarray
+    halo: Halo
+    wanted: np.ndarray
+    shared = False
     _table: np.ndarray | None
+    _renewed: np.ndarray | None = None
     _kernel: OnThreads = moving.move
 
     def __init__(self, sim: State, special: np.ndarray, width: int, stride: int) -> None:
@@ -73,9 +80,7 @@ class NodeSet:
         self.lead, self._start, self._one = (np.empty(n, np.int64) for _ in range(3))
         if n:
             build.special_nodes(*args, self.lead, self._start, self._one)
-        m = int(self._one.sum())
         self.begin, self.mass = np.zeros(n + 1, np.int64), np.empty(n)
-        self.corner, self.place, self.again = (np.empty(m, np.int64) for _ in range(3))
         lead = mesh.cells[self.lead // 4, self.lead % 4]
         row, part = sim.rows_of_nodes(self.lead, sim.node)
         self.functions = Placed(sim.acting(), row, mesh.points[lead])
@@ -83,28 +88,86 @@ class NodeSet:
         self.share = np.where(np.isnan(part), self._one / np.maximum(sim.point_corners[lead], 1), part)
         self.outside, self.felt = np.zeros((n, sim.dim)), np.zeros((n, 2 * sim.dim))
 
-    def find_corners(self, mass: np.ndarray) -> int:
-        """Find the corners of the nodes, and their masses from those of corners (rows, 4). Returns a corner whose
-        element is not held by this rank, or -1. Collective."""
+    def find_corners(self) -> int:
+        """Find the corners of the nodes. Returns a corner of an element of which no owner is known, or -1.
+        Collective."""
         sim, own = self.sim, self.sim.owned
-        lost = self._weigh(mass)
-        rows = self.corner // self.width
-        self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
-        return lost
-
-    def _weigh(self, mass: np.ndarray) -> int:
-        sim = self.sim
-        return int(
-            build.place_nodes(
-                self.lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1],
-                self.width, self.stride, mass, self.begin, self.corner, self.place, self.again, self.mass,
-            )
+        m = int(self._one.sum())
+        self.corner, self.place, self.again = (np.empty(m, np.int64) for _ in range(3))
+        build.place_nodes(
+            self.lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1], self.width,
+            self.stride, self.begin, self.corner, self.place, self.again,
         )  # fmt: skip
+        row = self.corner // self.width
+        away = np.flatnonzero((row < own.start) | (row >= own.stop))
+        self.shared = sim.comm.any(len(away) > 0)
+        self.wanted = np.empty(0, np.int64)
+        return self._request(away) if self.shared else -1
+
+    def _request(self, away: np.ndarray) -> int:
+        """Request the forces at the corners `away` (k,), of other ranks' elements, from their owners. Returns a corner
+        of which no owner is known, or -1. Collective."""
+        sim = self.sim
+        wanted, which = np.unique(self.code_of(self.corner[away]), return_inverse=True)
+        owner = ghosts.owners(sim, wanted // 4)
+        lost = int(wanted[owner < 0].max(initial=-1))
+        if sim.comm.any(lost >= 0):
+            return lost
+        order = np.argsort(owner, kind="stable")
+        place = np.empty(len(order), np.int64)
+        place[order] = np.arange(len(order))
+        self.corner[away] = self.width * len(sim.number) + self.stride * place[which]
+        self.wanted, owner = wanted[order], owner[order]
+        parcels = {p: self.wanted[owner == p] for p in np.unique(owner).tolist()}
+        sends = {p: 4 * sim.where[came // 4] + came % 4 for p, came in sim.comm.exchange(parcels).items()}
+        self.halo = Halo(sim.comm, 4 * len(sim.number), dict(sends), behind=True)
+        sim.halo.followers.append(self.halo)
+        return -1
+
+    def code_of(self, corner: np.ndarray) -> np.ndarray:
+        """Return the corners, element * 4 + k, by their positions in the forces (m,)."""
+        row, k = np.divmod(corner, self.width)
+        held = (row >= 0) & (row < len(self.sim.number))
+        out = np.where(corner < 0, -1 - corner, 4 * self.sim.number[np.where(held, row, 0)] + k // self.stride)
+        behind = corner >= self.width * len(self.sim.number)
+        out[behind] = self.wanted[(corner[behind] - self.width * len(self.sim.number)) // self.stride]
+        return out
+
+    def table(self, some: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Make a table of zeros for forces at corners (4 rows + w, stride): those of the rows of storage, then those of
+        other ranks' elements. Returns it, and its rows of storage (n, width). some: else one row, which nobody uses."""
+        count = 4 * len(self.sim.number) if some else 4
+        table = sparse_zeros((count + len(self.wanted) if some else count, self.stride))
+        return table, table[:count].reshape(-1, self.width)
+
+    def tables(self, loads: Loads, some: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Make that of loads, and return that of the forces, of which `move` renews the end with the least effort."""
+        loads.at_corners, loads.applied = self.table(loads.some)
+        table, rows = self.table(some)
+        if self.shared:
+            self.halo.add_ghost_field(table)
+            self._renewed = table
+        return table, rows
+
+    def _fetch(self, table: np.ndarray) -> None:
+        if table is self._renewed:
+            self.halo.refresh()
+        else:
+            self.halo.fill(table)
+
+    def masses_of_corners(self, mass: np.ndarray) -> np.ndarray:
+        """Return masses of the corners (4 rows + w,) from those of rows (n, 4); those of other ranks' elements are what
+        their owners have. Collective."""
+        if not self.shared:
+            return mass.reshape(-1)
+        out = np.concatenate([mass.reshape(-1), np.empty(len(self.wanted))])
+        self.halo.fill(out)
+        return out
 
     def set_masses(self, mass: np.ndarray, dt: float) -> None:
-        """Set the masses of nodes from those of corners (rows, 4), and the time step [s]."""
+        """Set the masses of nodes from those of corners (rows, 4), and the time step [s]. Collective."""
         sim = self.sim
-        self._weigh(mass)
+        build.weigh(self.begin, self.corner, self.stride, self.masses_of_corners(mass), self.mass)
         self.kick = dt / self.mass
         self._table = None if sim.conditions_vary() else sim.conditions_at(0.0, 0.0, dt)
 
@@ -118,22 +181,23 @@ class NodeSet:
         return self.place, self.again
 
     def move(self, force: np.ndarray, loads: Loads) -> None:
-        """New velocities from the forces on their corners, those of elements and loads. Collective."""
+        """New velocities from the forces on their corners, those of elements and loads; force: see `table`.
+        Collective."""
         if not (self.some or self.shared):
             return
         sim, clock = self.sim, self.sim.clock
         loads.find()
         if self.shared:
-            sim.halo.fill(force)
+            self._fetch(force)
             if loads.some:
-                sim.halo.fill(loads.applied)
+                self._fetch(loads.at_corners)
         table = self._table
         if table is None:
             now, half = sim.time_now(), 0.5 * clock.dt if sim.options.dynamic else 0.0
             table = conditions_now(sim, self.functions, now, now + half, clock.dt)
         self._kernel.on(sim.threads)(
             sim.threads, self.begin, self.corner, *self._where(), self.kick, self.condition, self.share, table,
-            loads.some, force, loads.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
+            loads.some, force, loads.at_corners, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip
 
     # ---- who they are ----------------------------------------------------------------------------------------------
@@ -165,8 +229,8 @@ class NodeSetSpace(NodeSet):
     _pulled: tuple[np.ndarray, np.ndarray] | None = None
 
     def pull(self, true_mass: np.ndarray) -> None:
-        """Only corners with masses (rows, 4) have forces."""
-        some = true_mass.reshape(-1)[self.corner // self.stride] > 0.0
+        """Only corners with masses (rows, 4) have forces. Collective."""
+        some = self.masses_of_corners(true_mass)[self.corner // self.stride] > 0.0
         before = np.concatenate([[0], np.cumsum(some)])
         self._pulled = before[self.begin], self.corner[some]
 
@@ -177,9 +241,8 @@ class NodeSetSpace(NodeSet):
     def _where(self) -> tuple[np.ndarray, np.ndarray]:
         return self.pulled
 
-    def _weigh(self, mass: np.ndarray) -> int:
-        self.corner, self.place, self.again = (np.empty(len(self.corner), np.int64) for _ in range(3))
-        lost = super()._weigh(mass)
+    def find_corners(self) -> int:
+        lost = super().find_corners()
         self.corner = self.corner.astype(np.int32)
         self.place = self.again = np.empty(0, np.int64)
         return lost

@@ -146,13 +146,14 @@ def _in_the_plane(sim: State, local: Local) -> np.ndarray:
 
 
 def _in_space(sim: State) -> np.ndarray:
-    """Overlaps of this rank in three dimensions."""
-    pairs, own = AllPairs(sim), sim.owned
-    depth = pairs.depths(sim)
-    row = pairs.face_row[pairs.first]
-    real = (row >= own.start) & (row < own.stop)  # a pair is reported by the owner of its face
-    first, second = pairs.first[real], pairs.second[real]
-    return _named(depth[real], pairs.face[first] // 4, pairs.element[second], np.cbrt(sim.areas))
+    """Overlaps of this rank in three dimensions. Collective."""
+    size, found = np.cbrt(sim.areas), []
+    for pairs in AllPairs.of(sim):
+        depth, row = pairs.depths(), pairs.face_row[pairs.first]
+        real = (row >= pairs.own.start) & (row < pairs.own.stop)  # a pair is reported by the owner of its face
+        first, second = pairs.first[real], pairs.second[real]
+        found.append(_named(depth[real], pairs.face[first] // 4, pairs.element[second], size))
+    return np.concatenate(found)
 
 
 def _named(depth: np.ndarray, one: np.ndarray, other: np.ndarray, size: np.ndarray) -> np.ndarray:

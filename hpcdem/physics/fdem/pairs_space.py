@@ -152,26 +152,25 @@ class ContactSpace:
             surface = Surface.of(sim)
             self.face = surface.faces_of(sim.number)
             rows = np.flatnonzero(surface.first[sim.number] >= 0)
-        self._place(sim, rows)
+        self._place(sim.number, sim.where[self.face // 4], rows)
         self._make_list(sim)
         self._put_histories(len(sim.alive), face, target, values)
         self._make_entries(sim)
 
-    def _place(self, sim: State, rows: np.ndarray) -> None:
-        """Contactors and targets, the latter in these storage rows."""
-        self.face_row, self.row = sim.where[self.face // 4], rows
+    def _place(self, number: np.ndarray, face_row: np.ndarray, rows: np.ndarray) -> None:
+        """Contactors and targets, in these rows of `number`."""
+        self.face_row, self.row = face_row, rows
         self.corner = ROW * self.face_row[:, None] + STRIDE * FACES[self.face % 4]
-        self.element, self.place = sim.number[rows], ROW * rows
+        self.element, self.place = number[rows], ROW * rows
         self.box = np.zeros((len(rows), 6))
 
-    def _near(self, sim: State, skin: float) -> tuple[np.ndarray, np.ndarray]:
-        own = sim.owned
+    def _near(self, sim: State, x: np.ndarray, own: slice, skin: float) -> tuple[np.ndarray, np.ndarray]:
         if not len(self.face) or not len(self.row):
             return np.empty(0, np.int64), np.empty(0, np.int64)
         owned = [(row >= own.start) & (row < own.stop) for row in (self.face_row, self.row)]
         first, second = detect.find(
             self.corner, self.face, owned[0], self.place[:, None] + STRIDE * np.arange(4), self.element, owned[1],
-            sim.x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
+            x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
         )  # fmt: skip
         if not sim.touches.all():
             keep = sim.touches[self.face[first] // 4] & sim.touches[self.element[second]]
@@ -180,7 +179,7 @@ class ContactSpace:
 
     def _make_list(self, sim: State) -> None:
         """Pairs that may touch, and their properties."""
-        self.first, self.second = first, second = self._near(sim, sim.rebuild_state.skin)
+        self.first, self.second = first, second = self._near(sim, sim.x, sim.owned, sim.rebuild_state.skin)
         m, several = len(first), self._several(sim)
         self.law, self.length = np.zeros((m, contact.LAW)), np.zeros(len(self.row))
         self.chosen, self.choice_begin = np.zeros(0, np.int64), np.zeros(1, np.int64)
@@ -329,15 +328,34 @@ class AllPairs(ContactSpace):
     """Faces and elements of which the boxes overlap now, of all elements, those inside too. What they remember and do
     is not requested."""
 
-    def __init__(self, sim: State) -> None:
-        self.face = Surface.of(sim).faces_of(sim.number)
-        self._place(sim, np.arange(len(sim.number)))
-        self.first, self.second = self._near(sim, 0.0)
+    def __init__(
+        self, sim: State, number: np.ndarray, x: np.ndarray, face: np.ndarray, face_row: np.ndarray, own: slice
+    ) -> None:
+        """number (n,), x (n, 16): of elements, of which `own` are owned; face, face_row (k,): free faces of some of
+        them, ascending, and their rows."""
+        self.x, self.face, self.own = x, face, own
+        self._place(number, face_row, np.arange(len(number)))
+        self.first, self.second = self._near(sim, x, own, 0.0)
 
-    def depths(self, sim: State) -> np.ndarray:
+    @staticmethod
+    def of(sim: State) -> list[AllPairs]:
+        """Find those of elements held here, then those of owned faces with elements beyond. Collective."""
+        surface, beyond = Surface.of(sim), sim.beyond
+        face = surface.faces_of(sim.number)
+        found = [AllPairs(sim, sim.number, sim.x, face, sim.where[face // 4], sim.owned)]
+        places = beyond.fetched(sim.x[sim.owned])
+        if len(beyond.number):
+            face = surface.faces_of(sim.number[sim.owned])
+            mine = np.unique(face // 4)
+            x = np.concatenate([sim.x[sim.where[mine]], *places.values()])
+            number, row = np.concatenate([mine, beyond.number]), np.searchsorted(mine, face // 4)
+            found.append(AllPairs(sim, number, x, face, row, slice(0, len(mine))))
+        return found
+
+    def depths(self) -> np.ndarray:
         """(m, 4) how deep each contactor is in its target [m], and where."""
         depth = np.zeros((len(self), 4))
-        self.depths_of(np.arange(len(self)), sim.x, depth)
+        self.depths_of(np.arange(len(self)), self.x, depth)
         return depth
 
 

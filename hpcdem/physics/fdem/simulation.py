@@ -24,11 +24,13 @@ from hpcdem.core.memory import aligned
 from hpcdem.decomp.curve import Grid
 from hpcdem.engine.model import FRESH, LISTS, STORAGE
 from hpcdem.engine.rebuild import LONGEST_WAIT
+from hpcdem.halo.beyond import Beyond
 from hpcdem.halo.ownership import Curve, Ownership
 from hpcdem.physics.fdem import (
     apart,
     breaks,
     build,
+    ghosts,
     guards,
     notices,
     overlaps,
@@ -38,14 +40,13 @@ from hpcdem.physics.fdem import (
 )
 from hpcdem.physics.fdem.edited import Edited
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import detect_space, elements, space, tets
+from hpcdem.physics.fdem.kernels import elements, space, tets
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
 from hpcdem.physics.fdem.mesh import Mesh, pieces
 from hpcdem.physics.fdem.middles import middles
 from hpcdem.physics.fdem.pairs import cut_corner
-from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.state import NARROW, WIDE, ListState
 
 MARGIN = 0.6
@@ -75,6 +76,7 @@ class Blocks(Edited):
     CommandError for values that make no sense, equal on all ranks.
     """
 
+    moves_ghosts = True
     _known: dict[str, Any] | None = None
 
     # ---- mesh ----------------------------------------------------------------------------------------------------
@@ -189,6 +191,7 @@ class Blocks(Edited):
         self.surface_loads.check_start()
         if self.untouched and self.options.mechanical:
             overlaps.check(self, self.local)
+            self.beyond = Beyond.nobody(self.comm)
             give_back()  # it looks at all elements, not only at those of the surface
 
     def _survey(self, places: np.ndarray, out: np.ndarray) -> None:
@@ -384,12 +387,12 @@ class Blocks(Edited):
         middle, radius = middles(self)
         of_loads = 0.0 if frozen else self.surface_loads.reach(self, middle)
         radius = float(self.comm.max_into(np.array([radius]))[0])
-        self._apart = self._linked = rebuild_state.side
+        self.apart_within = self.linked_within = rebuild_state.side
         if not frozen:
             rebuild_state.skin = self._skin()
             margin = MARGIN * self.mean_edge if self.options.collision else 0.0
-            self._linked = max(self._longest, of_loads) * (1.0 + 1e-9)
-            self._apart = max(margin * (1.0 + 1e-9), self._linked)
+            self.linked_within = max(self._longest, of_loads) * (1.0 + 1e-9)
+            self.apart_within = max(margin * (1.0 + 1e-9), self.linked_within)
             needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + margin
             if not needed <= rebuild_state.side <= 1.2 * needed:
                 rebuild_state.side = 1.05 * needed
@@ -407,7 +410,10 @@ class Blocks(Edited):
         self.histories = self.histories.take(order)
         self.cold = {name: values[order] for name, values in self.cold.items()}
         number, v = self.number[order], self.v[order]
-        self.x = self._connect(np.ascontiguousarray(self.x), order, cell, boxes=_boxes(self, order))
+        inside = ghosts.inner(self, number)
+        sends = self.ownership.sends(cell, 1, ghosts.boxes(self, order, inside))
+        self.beyond, sends = ghosts.set_apart(self, number, inside, sends)
+        self.x = self._connect(np.ascontiguousarray(self.x), order, sends)
         halo = self.halo
         self.n_left, self.n_own = halo.n_left, len(order)
         n = len(self.x)
@@ -419,12 +425,13 @@ class Blocks(Edited):
         self.number[self.owned], self.v[self.owned] = number, v
         halo.fill(self.number)
         halo.fill(self.v)
-        if self.options.collision:
-            halo.add_ghost_field(self.v)
+        halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
 
     def _build_lists(self, order: np.ndarray, cell: np.ndarray, frozen: bool) -> None:
         self.local = self._tables()(self)
+        if not self.untouched:
+            self.beyond = Beyond.nobody(self.comm)  # the first step needs their positions
         if not frozen:
             self.origin = self.places()
             self.listed = self.origin  # until lists are renewed without storage
@@ -492,29 +499,3 @@ def _along_curve(mesh: Mesh, side: float) -> np.ndarray:
     for at in pieces(len(keys)):
         keys[at] = grid.keys(mesh.points[mesh.cells[at]].mean(axis=1))
     return np.argsort(keys, kind="stable")
-
-
-def _boxes(sim: Blocks, order: np.ndarray) -> np.ndarray | None:
-    """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
-    overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these. In a model without
-    joints, elements without a corner on the surface meet others only where they share corners."""
-    if sim.dim == 2 or sim.comm.size == 1:
-        return None
-    boxes, mesh = np.empty((len(order), 6)), sim.the_mesh()
-    number, inner = sim.number[order], np.zeros(len(order), bool)
-    if sim._linked < sim._apart and not sim.joint_row.any():
-        inner = Surface.of(sim).first[number] < 0
-    for some, margin in ((np.flatnonzero(inner), sim._linked), (np.flatnonzero(~inner), sim._apart)):
-        part = np.empty((len(some), 6))
-        detect_space.boxes(tets.ROW * order[some, None] + tets.STRIDE * np.arange(4), sim.x, margin, part)
-        boxes[some] = part
-    if len(mesh.macros):  # all parts of one go together
-        of = mesh.macro_of()[number]
-        some = np.flatnonzero(of >= 0)
-        which = np.unique(of[some], return_inverse=True)[1]
-        whole = np.full((len(some), 6), np.inf)
-        boxes[:, 3:] *= -1.0
-        np.minimum.at(whole, which, boxes[some])
-        boxes[some] = whole[which]
-        boxes[:, 3:] *= -1.0
-    return boxes

@@ -18,6 +18,7 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.units import with_prefix
 from hpcdem.engine.model import Model
 from hpcdem.engine.rebuild import RebuildState
+from hpcdem.halo.beyond import Beyond
 from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.conditions import Relaxation
 from hpcdem.physics.fdem.definition import ModelDefinition
@@ -98,6 +99,12 @@ class State(ModelDefinition, Model):
     surface_loads: SurfaceLoads
     n_left: int
     n_own: int
+    linked_within: float
+    """Distance within which elements are held that share joints, fluid or heat with owned ones [m]."""
+    apart_within: float
+    """That of elements which may touch them."""
+    beyond: Beyond
+    """Elements of other ranks of which no rows are held, until the first step of a new model is checked."""
     where: np.ndarray
     """(ne,) storage row of each element of the model, -1: not held here."""
     areas: np.ndarray

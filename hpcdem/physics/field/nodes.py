@@ -56,8 +56,8 @@ class Nodes:
         self.begin = np.zeros(n + 1, np.int64)
         corner, place, again = (np.empty(total, np.int64) for _ in range(3))
         lost = build.place_nodes(
-            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], FORCE, 2, blocks.local.true_mass,
-            self.begin, corner, place, again, np.empty(n),
+            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], FORCE, 2, self.begin, corner, place,
+            again,
         )  # fmt: skip
         lost = int(blocks.comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:

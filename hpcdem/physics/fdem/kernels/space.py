@@ -206,7 +206,10 @@ def _move(
             ey += share[i] * table[q, FORCE + 1]
             ez += share[i] * table[q, FORCE + 2]
         fx, fy, fz = fx + ex, fy + ey, fz + ez
-        at = U(corner[begin[i]])
+        m = begin[i]
+        while corner[m] >= v.size:
+            m += 1
+        at = U(corner[m])
         vx, vy, vz = v[at], v[at + U(1)], v[at + U(2)]
         drag = alpha if table[q, NODE_DAMP] < 0.0 else table[q, NODE_DAMP]
         wx = vx + k * laws.damped(fx, vx, drag)
@@ -221,7 +224,8 @@ def _move(
         felt[i, 0], felt[i, 1], felt[i, 2], felt[i, 3], felt[i, 4], felt[i, 5] = fx, fy, fz, ex, ey, ez
         for m in range(begin[i], begin[i + 1]):
             at = U(corner[m])
-            v[at], v[at + U(1)], v[at + U(2)] = wx, wy, wz
+            if at < v.size:
+                v[at], v[at + U(1)], v[at + U(2)] = wx, wy, wz
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -298,8 +302,8 @@ def kick(threads, *args):
 @on_threads
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners, see `nodes.move`; corner (m,): where they begin in
-    `force`, `applied` and v (flat); pull_begin, pull_corner: the same of those that can have a force; table (rows, 14);
-    outside (n, 3) [N], felt (n, 6)."""
+    `force`, `applied` and v (flat), those of other ranks' elements beyond the end of v; pull_begin, pull_corner: the
+    same of those that can have a force; table (rows, 14); outside (n, 3) [N], felt (n, 6)."""
     for t in prange(threads):
         _move(t, threads, *args)
 
