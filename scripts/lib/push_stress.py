@@ -17,6 +17,7 @@ from pathlib import Path
 import click
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -86,11 +87,32 @@ def measured(folder: Path) -> np.ndarray:
     return medians(np.column_stack([x, y, shear / 0.5e6]))
 
 
+def draw(runs: np.ndarray, theirs: np.ndarray, path: Path) -> None:
+    """Medians along x at each depth, deepest last: each run, mean, band of two standard deviations; the page as
+    points."""
+    figure = Figure(figsize=(8.0, 3.0), layout="constrained")
+    middles = [sum(ends) / 2.0 for ends in X]
+    axes = figure.subplots(1, len(Y), sharey=True)
+    for ax, j in zip(axes, reversed(range(len(Y)))):
+        mean, spread = runs[:, j].mean(axis=0), runs[:, j].std(axis=0, ddof=1)
+        ax.fill_between(middles, mean - 2.0 * spread, mean + 2.0 * spread, color="#c8d6e8", label="mean ± 2 s")
+        ax.plot(middles, runs[:, j].T, color="#4477aa", lw=0.6)
+        ax.plot(middles, mean, color="#1e3c6e", lw=2.0, label=f"mean of {len(runs)} seeds")
+        ax.plot(middles, theirs[j], "o", color="#c81e1e", label="published")
+        ax.set(xlabel="x (km)", title=f"{Y[j][0]:g} to {Y[j][1]:g} km above the floor")
+        ax.title.set_size("medium")
+    axes[0].set_ylabel("σ1 − σ3 (MPa)")
+    axes[0].set_ylim(bottom=0.0)
+    axes[0].legend(frameon=False)
+    figure.savefig(path, dpi=130)
+
+
 @click.command()
 @click.argument("shared", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--seeds", help="As 1:10; default: the published page alone.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("push_seeds"), show_default=True)
-def main(shared: Path, seeds: str | None, out: Path) -> None:
+@click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Also draw the runs into FILE.")
+def main(shared: Path, seeds: str | None, out: Path, figure: Path | None) -> None:
     """Compare stresses with the page in SHARED/reference_figures; the script is SHARED/manual_scripts/push.py."""
     theirs = medians(published(shared / "reference_figures/push_10km.png"))
     runs = made(shared / "manual_scripts/push.py", seeds, out) if seeds else np.empty((0, *theirs.shape))
@@ -100,6 +122,8 @@ def main(shared: Path, seeds: str | None, out: Path) -> None:
         values = runs[:, j, i]
         ours = f" {values.mean():.0f} ± {values.std(ddof=1):.0f} |" if len(runs) > 1 else ""
         print(f"| {Y[j][0]:g} to {Y[j][1]:g} | {X[i][0]:g} to {X[i][1]:g} | {theirs[j, i]:.0f} |{ours}")
+    if figure is not None and len(runs) > 1:
+        draw(runs, theirs, figure)
 
 
 if __name__ == "__main__":
