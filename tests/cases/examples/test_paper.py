@@ -16,7 +16,7 @@ PAGES = ("sections", "slip", "flexure", "strain")
 
 def figures(folder: Path, printed: str) -> None:
     """All of them, as PNG and PDF."""
-    named = {Path(name).name for name in re.findall(r"^figure: (\S+)$", printed, flags=re.MULTILINE)}
+    named = {Path(name).name for name in re.findall(r"^figure: (\S*paper_\S+)$", printed, flags=re.MULTILINE)}
     assert named == {f"paper_{page}.{kind}" for page in PAGES for kind in ("png", "pdf")}
     assert all((folder / name).stat().st_size > 10_000 for name in named)
 
