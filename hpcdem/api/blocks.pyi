@@ -48,7 +48,7 @@ class Geometry(Words):
         Parameters
         ----------
         first : a corner [m].
-        second : the corner across [m].
+        second : the opposite corner [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def circle(
@@ -95,7 +95,7 @@ class Geometry(Words):
         Parameters
         ----------
         first : a corner [m].
-        second : the corner across [m].
+        second : the opposite corner [m].
         as_layer : name of the layer; a layer may hold several shapes.
         """
     def sphere(self, centre: Point, radius: float, as_layer: str) -> None:
@@ -143,7 +143,7 @@ class Geometry(Words):
 
         Parameters
         ----------
-        point : a point of it [m].
+        point : a point of the plane [m].
         normal : normal of any length.
         as_layer : name of the layer; a layer may hold several shapes.
         """
@@ -171,7 +171,7 @@ class Geometry(Words):
         layer : layer of the polygons.
         axis : direction of the axis.
         as_layer : name of the layer; a layer may hold several shapes.
-        about : a point of it [m] (default: (0,0,0)).
+        about : a point of the axis [m] (default: (0,0,0)).
         angle : angle of revolution, right-handed, up to 360 [degrees] (default: 360).
         """
     def fractures(
@@ -291,11 +291,12 @@ class Geometry(Words):
         Parameters
         ----------
         layer : name of the layer.
-        scale : done first.
-        rotate : then, counter-clockwise; in three dimensions right-handed about an axis [degrees].
-        axis : centre of rotation (in three dimensions; default: (0,0,1)).
-        about : centre of both [m] (default: the origin).
-        move : last [m].
+        scale : scale factor, applied first.
+        rotate : angle of rotation, applied after the scale, counter-clockwise; in three dimensions right-handed
+            about the axis [degrees].
+        axis : axis of rotation (in three dimensions; default: (0,0,1)).
+        about : centre of scaling and rotation [m] (default: the origin).
+        move : translation, applied last [m].
         """
     def scale(self, factors: Point, layer: Sequence[str] | None = None) -> None:
         """Multiplies the coordinates of layers, of all without layer; a negative factor mirrors. Round shapes need
@@ -405,7 +406,7 @@ class Mesh(Words):
         Parameters
         ----------
         first : a corner [m].
-        second : the corner across [m].
+        second : the opposite corner [m].
         cells : number of cells along x and y, in three dimensions also z.
         type : triangles or quads, in three dimensions tetrahedra or hexahedra (default: tri, tet).
         diagonal : direction of the diagonals; alternate: it changes from rectangle to rectangle; both: two in each
@@ -465,7 +466,7 @@ class Mesh(Words):
             mesh_size: length of edges there [m] (default: the largest of the others); is_boundary: the piece bounds
             the mesh: elements outside it are removed (default: the first piece).
         arc : an arc, counter-clockwise; each is (center, start_point, end_point, mesh_size, is_boundary); center:
-            centre [m]; start_point: where it begins [m]; end_point: where it ends [m]; mesh_size: length of edges
+            centre [m]; start_point: start of the arc [m]; end_point: end of the arc [m]; mesh_size: length of edges
             there [m] (default: the largest of the others); is_boundary: the piece bounds the mesh: elements outside
             it are removed (default: the first piece).
         group : the group that the new elements are in.
@@ -556,7 +557,7 @@ class Mesh(Words):
         Parameters
         ----------
         first : a corner [m].
-        second : the corner across [m].
+        second : the opposite corner [m].
         size : length of edges [m].
         group : the group that the new elements are in.
         set : the set of the group.
@@ -639,14 +640,14 @@ class Mesh(Words):
 
         Parameters
         ----------
-        points : the nodes [m].
+        points : positions of the nodes [m].
         """
     def add_element(self, *corners: int) -> None:
         """Adds an element by the numbers of its nodes.
 
         Parameters
         ----------
-        corners : three or four, in three dimensions four.
+        corners : numbers of three or four nodes, in three dimensions of four.
         """
     def scale(self, factors: Point) -> None:
         """Multiplies the coordinates of all points of the mesh, before the first model or condition is assigned.
@@ -1238,7 +1239,7 @@ class Elements(Stressed):
 
         Parameters
         ----------
-        hidden : whether they are hidden.
+        hidden : whether the elements are hidden.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def collision(self, on: bool, *, where: Where | None = None) -> None:
@@ -1394,8 +1395,8 @@ class Faces(Fluxed):
         quiet : dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given with it
             enters as a wave of half its size.
         incoming_x : velocity along x of a plane wave that enters through quiet faces [m/s].
-        incoming_y : velocity along y of that wave [m/s].
-        incoming_z : velocity along z of that wave [m/s] (in three dimensions).
+        incoming_y : velocity along y of the plane wave [m/s].
+        incoming_z : velocity along z of the plane wave [m/s] (in three dimensions).
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def heat(
@@ -1941,7 +1942,7 @@ class Nodes(Moved):
 
         Parameters
         ----------
-        local : part, from 0 to 1.
+        local : fraction of the unbalanced force, from 0 to 1.
         where : text of a RANGE, or terms of hpcdem.physics.fdem.groups; left out: all.
         """
     def fluid(
@@ -2088,8 +2089,8 @@ class Bolts(Objects):
 
         Parameters
         ----------
-        first : head [m].
-        second : end [m].
+        first : head of the bolt [m].
+        second : end of the bolt [m].
         mesh_size : greatest length of its elements [m] (default: 0.2).
         group : the group of its elements and nodes (default: none).
         set : the set of the group.
@@ -2510,7 +2511,7 @@ class Histories(Recorded):
         Parameters
         ----------
         file : name of the file.
-        names : only these (default: all).
+        names : names of the histories to export (default: all).
         """
 
 class Charts(Words):
@@ -2553,8 +2554,8 @@ class Charts(Words):
         name : name.
         x : history along x; without it the time (default: time).
         y : history along y.
-        scale_x : factor (default: 1).
-        scale_y : factor (default: 1).
+        scale_x : factor on the values (default: 1).
+        scale_y : factor on the values (default: 1).
         values : points (x,y).
         profile : present values of the fluid along the line of the joints of the range, over the distance [m] from
             its left end (in the plane).
@@ -2592,7 +2593,7 @@ class Output(Words):
         ----------
         file : first part of the names of the files, in the folder of the results.
         every : steps between two frames (default: once, now).
-        off : no more frames of this name.
+        off : stops the frames of this name.
         """
     def image(
         self,
@@ -2835,7 +2836,7 @@ class BlockCommands(Clocks):
 
         Parameters
         ----------
-        on : whether they creep.
+        on : whether elements creep.
         dt : creep step of static runs; with change the first one [s].
         change : the creep step is adapted to this change of stress: the largest change of the deviators of elements
             and of their Kelvin dashpots in a creep step, over the largest deviator; the step at most halves or

@@ -26,7 +26,7 @@ from hpcdem.runtime import launch
 def calibrate(**options: Any) -> None:
     """Find the parameters of bonds, contacts or joints with which specimen tests reproduce measured properties: runs
     of the scripts in SETTINGS, emulators of their results, the posterior of the parameters, its sensitivity, and what
-    the targets cannot tell."""
+    the targets cannot determine."""
 
 
 def start(words: list[str]) -> NoReturn:

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 MOST_PARTS, LEAST_PARTS = 100, 4
-"""Implicit steps into which an interval of diffusion is divided."""
+"""Largest and smallest number of implicit steps into which an interval of diffusion is divided."""
 SWEEPS = 200
 CLOSE = 1e-6
 """Change of a slope, relative to the largest one, at which avalanches end."""
@@ -130,7 +130,7 @@ def raised(height: np.ndarray, most: float, level: float) -> np.ndarray:
 
 
 COMPACTIONS = 32
-"""Steps of porosity between that at the surface and none."""
+"""Number of equal steps by which the porosity decreases from that at the surface to zero."""
 
 
 def compaction(depth: np.ndarray, scale: float) -> np.ndarray:

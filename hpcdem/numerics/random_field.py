@@ -29,9 +29,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.rng import uniforms
 
 WAVES = 1024
-"""N. Extreme values of Z reach sqrt(2 N); its kurtosis is 3 - 3 / (2 N)."""
+"""Number N of waves of a field. Extreme values of Z reach sqrt(2 N); its kurtosis is 3 - 3 / (2 N)."""
 BLOCK = 4096
-"""Places whose waves are added at once."""
+"""Number of positions at which the waves are summed at once."""
 WEIBULL, NORMAL, LOGNORMAL = "weibull", "normal", "lognormal"
 EXPONENTIAL, GAUSSIAN = "exponential", "gaussian"
 _STREAMS = {"element": 1, "element-face": 2, "face-joint": 3}

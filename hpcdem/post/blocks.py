@@ -32,11 +32,11 @@ OPEN, YIELD, EDGE, INK = "#202020", "#8f8f8f", "#c9ced1", "#202020"
 LINES = (TENSION, MIXED, SHEAR, INK)
 GROUPS = ("#e9e4d8", "#d5dde3", "#dfe8d2", "#f1dfc8", "#e2d8e6", "#d3e4e2", "#ece6bf", "#dcd6cf")
 KINDS = ((1.0, 4.0 / 3.0, TENSION, "tension"), (4.0 / 3.0, 5.0 / 3.0, MIXED, "mixed"), (5.0 / 3.0, 2.1, SHEAR, "shear"))
-"""Modes of broken joints from ... to ..., 1 opened and 2 slid: colour, word."""
+"""Kinds of broken joints: lowest and highest mode (1 opened, 2 slid), colour, word."""
 MOST_EDGES = 4000
-"""The mesh of larger models is illegible and not drawn."""
+"""Largest number of edges of a mesh that is drawn; the mesh of a larger model would be illegible."""
 NEAR = 1e-3
-"""Corners nearer than this part of an edge share the mean of their stress."""
+"""Distance over an edge: corners that are nearer to each other get the mean of their stresses."""
 LEVELS = 14
 ROUNDING = 1e-3  # of a step between contours: values that are so little outside are at the edge
 _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the panels, between them, for the colours
@@ -196,10 +196,10 @@ def draw(state: MeshState, appearance: Appearance = USUAL, seen: View | None = N
     left, bottom, top, gap, bar = (k * length for length in (_LEFT, _BOTTOM, _TOP, _GAP, _BAR))
     after = [gap if panel == CRACKS else bar for panel in panels]  # room for colours, or none
     between = sum(after[:-1]) if beside else 0.0
-    room = (appearance.page - left - bar - between) / across
-    if room < 1.0:
+    free = (appearance.page - left - bar - between) / across
+    if free < 1.0:
         raise UsageError(f"a page of {appearance.page:g} cm is too small for letters of {appearance.font:g} points")
-    width = min(room, 21.0 / ratio)
+    width = min(free, 21.0 / ratio)
     height = width * ratio
     down = 1 if beside else len(panels)
     page = left + across * width + between + bar, down * (height + top) + (down - 1) * 0.3 * gap + bottom
@@ -349,7 +349,7 @@ CONTOURS = {
     TEMPERATURE: Contours(temperature, temperature_range, "K", "temperature", "RdYlBu_r", of_corners=True),
 }
 COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
-"""Panels with a bar of colours."""
+"""Panels with a colour bar."""
 
 
 def coloured(axes: Any, state: MeshState, panel: str, span: tuple[float, float], scale: float) -> Any:

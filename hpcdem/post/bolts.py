@@ -11,7 +11,7 @@ from hpcdem.io.vtkhdf_mesh import MeshState
 
 BAR, TENSION, COMPRESSION = "#202020", "#2f7fb5", "#d0562a"
 HEIGHT = 0.12
-"""Of the area at the largest force, over the length of the longest bolt."""
+"""Height of the area at the largest force, over the length of the longest bolt."""
 BROKEN = 16
 """Bit of the state of an element."""
 

@@ -16,9 +16,9 @@ from hpcdem.post.saved import save
 SIZE = 5.5, 3.9
 """Size of the diagram [inches]."""
 FONT = 9.0
-"""Points, beside a model."""
+"""Size of letters of a diagram beside a model [points]."""
 BAR = 0.85
-"""Width of a bar of colours beside a body, with its numbers and name, in inches."""
+"""Width of a colour bar beside a body, with its numbers and name [inches]."""
 IN_SPACE = {
     "plastic": ("elements", "plastic_shear_strain"), "temperature": ("elements", "mean_temperature"),
     "pressure": ("joints", "fluid_pressure"), "saturation": ("joints", "saturation"),
@@ -27,7 +27,7 @@ IN_SPACE = {
 }  # fmt: skip
 """Field that colours a body beside a diagram, by the panel: objects and one of their fields."""
 COLOURS = ("#202020", "#2a8c5a", "#8c5aa8", "#9a6b2f")
-"""Colours of curves beside a model: none that a crack has."""
+"""Colours of curves beside a model; no crack has any of them."""
 Points = Sequence[tuple[float, float]]
 
 

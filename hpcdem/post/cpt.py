@@ -329,7 +329,8 @@ def _white_in_the_middle(name: str, breaks: Sequence[float]) -> ColourTable:
 INVAR = _white_in_the_middle("invar", (-10000, -20, -1, -0.1, -0.03, 0, 0.02, 0.3, 1, 20, 10000))
 INVAR2 = _white_in_the_middle("invar2", (-16000, -800, -80, -4.8, -0.16, 0, 0.16, 4.8, 80, 800, 16000))
 VOLUME = _white_in_the_middle("volume", (-100, -70, -30, -10, -3, 0, 2, 30, 100, 2000, 1e6))
-"""Volumetric strain in per cent: INVAR's steps in growth; no volume shrinks by more than 100 %."""
+"""Colours of volumetric strain in per cent: the steps of INVAR for increases; a volume cannot decrease by more than 100
+%."""
 
 
 def stress_table(most: float) -> ColourTable:

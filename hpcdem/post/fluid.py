@@ -11,9 +11,9 @@ from hpcdem.io.vtkhdf_mesh import MeshState
 
 DRY = "#b9b4aa"
 WET = 0.5
-"""Channels that are less saturated are drawn as dry."""
+"""Saturation below which channels are drawn as dry."""
 LEAST = 0.3
-"""Width of the narrowest channel, over that of the widest."""
+"""Width of the narrowest channel over that of the widest."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ PICTURES = {
     "velocity": Shown("fluid_velocity", "m/s", "fluid velocity", False, "PuRd"),
     "concentration": Shown("proppant_concentration", "", "proppant concentration", False, "YlOrBr"),
 }
-"""By the word for each."""
+"""Pictures of the fluid by the word for each."""
 
 
 def there(state: MeshState) -> bool:

@@ -8,8 +8,8 @@ from hpcdem.post import surface as tops
 from hpcdem.post.measure.grains import Grains
 
 BALL, SPACING = 3.0, 0.5
-"""Radius of the ball that is rolled over the particles of a layer, and distance of the points of a horizon, in median
-radii."""
+"""Radius of the ball that is rolled over the particles of a layer, and distance between the points of a horizon, in
+median radii."""
 
 
 def horizons(g: Grains) -> dict[str, list[np.ndarray]]:

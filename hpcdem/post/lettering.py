@@ -13,9 +13,9 @@ PREFERRED = (
     "WenQuanYi Micro Hei", "Microsoft YaHei", "SimHei", "PingFang SC", "Hiragino Sans GB", "Heiti SC", "SimSun",
     "Noto Sans CJK JP", "Droid Sans Fallback", "Arial Unicode MS",
 )  # fmt: skip
-"""Preferred fonts."""
+"""Fonts in the order of preference."""
 WIDE = "\u2e80"
-"""From here on letters are those of Chinese, Japanese and Korean."""
+"""First of the letters that are Chinese, Japanese or Korean."""
 PACKAGES = "fonts-noto-cjk or fonts-wqy-zenhei (Debian, Ubuntu), google-noto-sans-cjk-fonts (Fedora)"
 _warned: set[str] = set()
 

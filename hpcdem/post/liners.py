@@ -11,7 +11,7 @@ from hpcdem.io.vtkhdf_mesh import MeshState
 
 BEAM, FORCE, MOMENT = "#202020", "#7a5195", "#1f7a4d"
 HEIGHT = 0.14
-"""Of an area at the largest value, over the extent of the liners."""
+"""Height of an area at the largest value, over the extent of the liners."""
 DELETED = 32
 """Bit of the state of an element."""
 

@@ -27,10 +27,10 @@ FONT = 9.0
 _MARGINS = 0.9 * CM, 0.45 * CM, 1.15 * CM, 0.35 * CM  # left (without numbers), right, bottom, top of the axes
 _DIGIT = 0.2 * CM
 BAR = 1.9 * CM
-"""Room for the bar of colours of a field."""
+"""Width of the colour bar of a field with its labels."""
 SIDES = ("left", "right", "bottom", "top")
 MODEL = ("bfill", "wall")
-"""The usual picture: filled particles and walls."""
+"""Default layers of a picture: filled particles and walls."""
 MAJOR, MINOR = 10000.0, 1000.0
 """Steps of the ticks of zdem2jpg [m], for models that are neither much smaller nor much larger."""
 _LARGE = 120_000.0

@@ -14,12 +14,13 @@ from hpcdem.post.lettering import lettered
 
 FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
 SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
-"""Settings of matplotlib while a file is written: texts stay texts, and an SVG's ids are the same every time."""
+"""Settings of matplotlib while a file is written: texts stay texts, and the ids of an SVG are the same every time."""
 
 LONGEST_SIDE = 65535
-"""Pixels of a picture along a side: the most a JPEG can have."""
+"""Largest number of pixels along a side of a picture, which is the limit of JPEG."""
 MOST_PIXELS = 250e6
-"""Of them in all: a gigabyte while it is drawn; a sheet A0 at 300 dots per inch has 140 million."""
+"""Largest number of pixels of a picture: a gigabyte while it is drawn; a sheet A0 at 300 dots per inch has 140
+million."""
 
 
 def write(make: Callable[[], Any], path: str | os.PathLike, dpi: float) -> Path:

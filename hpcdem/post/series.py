@@ -82,7 +82,7 @@ class ViewJob:
 
 
 class Task(Protocol):
-    """Something that takes a while and can be done in another process: it can be pickled."""
+    """Work that can be done in another process: it can be pickled."""
 
     @property
     def name(self) -> str:

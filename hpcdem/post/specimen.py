@@ -14,9 +14,9 @@ from hpcdem.post import plots
 from hpcdem.post.measure.figures import INK, key, label, page
 
 STEP = 5.0
-"""Arcs are drawn by chords of at most this angle, degrees."""
+"""Largest angle [degrees] of the chords by which arcs are drawn."""
 ANCHORS = "9c3708", "e0690f", "f2b53c", "a9c46c", "46a592", "3f7fb5", "6a6fc4"
-"""Colours of the classes, coarse to fine, those between by interpolation."""
+"""Colours of the classes, coarse to fine; those between are interpolated."""
 TARGET, ACHIEVED = "#404040", "#c8511b"
 MOST_KEYS = 10
 TALLEST = 20.0
@@ -98,7 +98,7 @@ def packing(
     outlines: Outlines,
     class_of: np.ndarray,
     sizes: np.ndarray,
-    room: tuple[float, float],
+    extent: tuple[float, float],
     box: tuple[float, float],
     title: str = "",
 ) -> Any:
@@ -107,7 +107,7 @@ def packing(
     the lowest on the left."""
     from matplotlib.patches import Rectangle
 
-    width, height = max(room[0], 1e-30), max(room[1], box[1])
+    width, height = max(extent[0], 1e-30), max(extent[1], box[1])
     usable = plots.PAGE_WIDTH - 1.75 - 3.2
     pieces = max(1, math.ceil(math.sqrt(height * usable / (width * TALLEST)) - 1e-9)) if height > 4.0 * width else 1
     high = height / pieces

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from hpcdem.post import grid as grids
 
 REACH = 1.5
-"""Particles nearer to a node, or to a particle, than this many spacings count in its fit."""
+"""Distance in spacings from a node, or from a particle, up to which particles belong to its fit."""
 NEIGHBOURS = (6, 12, 18)
 """A fit has the first ring of a dense packing; two or three times as many particles where that gives no dF."""
 FLAT = 1e-4
@@ -120,7 +120,7 @@ def increment(
 
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 1.0])
-"""F of a particle that is new: xx, xy, yx, yy."""
+"""Deformation gradient F of a new particle: xx, xy, yx, yy."""
 
 
 def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:

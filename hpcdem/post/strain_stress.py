@@ -340,7 +340,7 @@ def carried(link: Link, f_earlier: np.ndarray | None) -> np.ndarray:
 
 
 NOTHING = np.append(strain.IDENTITY, [0.0, 0.0])
-"""F and displacement before anything has happened."""
+"""F and displacement at the beginning."""
 
 
 # --- the section -----------------------------------------------------------------------------------------------

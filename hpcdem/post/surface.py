@@ -9,7 +9,7 @@ import numpy as np
 from hpcdem.core.fields import FIX_X, FIX_Y
 
 LOOSE = 1 / 500
-"""Pieces of less than this part of all particles are flying bits, not the model."""
+"""Fraction of all particles: smaller pieces are loose fragments and no part of the model."""
 HELD = FIX_X | FIX_Y
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 FINE, LEVELS = 48, 3
-"""Positions that are compared, and how often the interval around the best one is refined."""
+"""Number of positions that are compared, and number of refinements of the interval around the best one."""
 
 
 def top(at: np.ndarray, radius: float, discs: np.ndarray, walls: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from hpcdem.sweep.plan import DONE, RUNNING, Plan
 
 SCRIPT = "array.sh"
 OURS = ("array", "ntasks", "cpus-per-task", "output", "open-mode", "requeue")
-"""Options of sbatch that are settled by the sweep."""
+"""Options of sbatch that the sweep sets itself."""
 
 _TEXT = """\
 #!/bin/bash

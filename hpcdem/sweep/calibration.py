@@ -19,15 +19,15 @@ from hpcdem.sweep.emulator import Emulator, fit
 Forward = Callable[[np.ndarray], np.ndarray]
 """(n, seeds, targets) numbers at points (n, d) in the unit cube; NaN where a run failed."""
 VAGUE = 0.7
-"""A parameter whose posterior is wider than this part of its prior is not determined by the targets."""
+"""Width of a posterior over that of its prior above which the targets do not determine the parameter."""
 TIED = 0.8
-"""Correlation above which only a combination of two parameters is determined."""
+"""Correlation of two parameters above which only a combination of them is determined."""
 APART = 0.02
-"""Least distance of two points of a round, in the unit cube."""
+"""Smallest distance of two points of a round, in the unit cube."""
 MORE = 3
-"""Points beyond the number of parameters that an emulator needs."""
+"""Number of points beyond the number of parameters that an emulator needs."""
 FAR = 3.0
-"""Standard deviations from a target at which it is called out of reach."""
+"""Distance from a target, in tolerances, above which it is reported as out of reach."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from hpcdem.core.errors import UsageError
 from hpcdem.lang.parameters import Adjustable, Value
 
 MOST = 100_000
-"""Members of a sweep: more are a slip of the keyboard."""
+"""Largest number of members of a sweep; more are a typing mistake."""
 
 
 @dataclass(frozen=True)

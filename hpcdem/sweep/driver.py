@@ -19,7 +19,7 @@ from hpcdem.runtime import launch
 from hpcdem.sweep.plan import DONE, LOG, RUNNING, STATE, Member, Plan, read_json
 
 POLL_SECONDS = 0.1
-"""Seconds between two looks at the members."""
+"""Time between two checks of the members [s]."""
 
 
 def jobs_at_once(plan: Plan, jobs: int | None) -> int:

@@ -25,10 +25,11 @@ DRAWN = {
     "fluid": ("wet_length[m]", "pressure[Pa]", "aperture[m]"),
     "emission": ("cumulative", "cumulative_energy[J]"),
 }
-"""The columns of a table that are drawn, by the beginning of its name; of others all, as far as MOST."""
+"""Columns that are drawn, by the beginning of the name of the table; of other tables all columns, up to MOST."""
 MOST = 4
 GROUPS = 4
-"""Groups beside each other in one panel; of more only the band of all members is drawn, and the dependence."""
+"""Largest number of groups side by side in one panel; with more groups only the band of all members is drawn, and the
+dependence."""
 HIGH = 4.2
 """Height of a panel [cm]."""
 

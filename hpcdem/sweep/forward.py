@@ -19,7 +19,8 @@ from hpcdem.sweep.calibration import Target
 from hpcdem.sweep.design import Range
 
 OF = ("max", "min", "end", "mean", "slope")
-"""Values taken from a history: a number of y, or the slope of y over x while y is within part of its maximum."""
+"""Values that can be taken from a history: a value of y, or the slope of y over x while y is within a fraction of its
+maximum."""
 _NUMBER = "a number", lambda v: isinstance(v, int | float) and not isinstance(v, bool)
 _WHOLE = "a whole number above 0", lambda v: _whole(v) and v > 0
 _NATURAL = "a whole number from 0 on", lambda v: _whole(v) and v >= 0
@@ -44,7 +45,7 @@ _KEYS: dict[str, dict[str, tuple[str, Callable[[Any], bool]]]] = {
     "search": {"first": _WHOLE, "rounds": _NATURAL, "batch": _WHOLE, "seed": _NATURAL},
     "write": {"lines": _TEXTS},
 }  # fmt: skip
-"""Keys of each table: what their values are."""
+"""Keys of each table, and what their values are."""
 
 
 def _whole(value: Any) -> bool:

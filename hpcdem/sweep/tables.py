@@ -24,15 +24,15 @@ SERIES: dict[str, tuple[str, ...]] = {
     "wedge": (), "wallforce": ("wall",), "layers": ("kind", "name"), "cracks": (), "cracks_joints": (), "fragments": (),
     "fluid": (), "emission": (), "faults_total": (),
 }  # fmt: skip
-"""Tables of `hpcdem measure` with a row per moment, or one for each of these keys."""
+"""Tables of `hpcdem measure` with a row per moment, or with one for each of these keys."""
 TIMES = ("step", "ini", "time[s]", "shortening[m]", "from", "to")
 OF_FAULTS = ("born_shortening[m]", "born_time[s]", "x[m]", "dip_at_birth[deg]", "dip[deg]", "length[m]", "slip[m]",
              "throw[m]", "heave[m]", "largest_slip_rate[m/s]", "share_of_shortening")  # fmt: skip
 """Columns of the n-th fault of each member that are compared."""
 CHANCE = ("seed", "twin")
-"""Parameters that groups do not distinguish."""
+"""Parameters by which groups are not distinguished."""
 APART = ("tracks",)
-"""Measures of single particles, which are others in each member."""
+"""Measurements of single particles, which differ between members."""
 
 Column = tuple[str, str]
 """Table and column."""

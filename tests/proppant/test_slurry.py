@@ -252,7 +252,7 @@ def test_what_makes_no_sense_is_refused() -> None:
         (lambda: bring(sim, proppant, 0.7), "at most that of a pack, 0.6"),
         (lambda: bring(sim, proppant, -0.1), "negative"), (lambda: bring(sim, proppant, "no such"), "no table"),
         (lambda: proppant.fill(None, 0.61), "between 0 and that of a pack"),
-        (lambda: proppant.fill(at(sim, x=0.2), 0.1), "no channel ends"),
+        (lambda: proppant.fill(at(sim, x=0.2), 0.1), "not at the end of a channel"),
         (lambda: proppant.adjust({"viscosity_power": -4.0}), "viscosity_power"),
         (lambda: proppant.adjust({"proppant_concentration_limit": 0.8}), "proppant_concentration_limit"),
         (lambda: proppant.adjust({"proppant_size": 0.0}), "proppant_size"),

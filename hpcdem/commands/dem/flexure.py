@@ -131,7 +131,7 @@ def _rigidity(rigidity: float | None, young: float | None, poisson: float, te: f
 
 
 def _wall_extent(sim: Simulation, wall: int) -> tuple[np.ndarray, float, float, float]:
-    """No particles, left and right end and height of a wall. CommandError if it cannot bend."""
+    """Return no particles, and left end, right end and height of a wall. CommandError if it cannot bend."""
     w, row = sim.walls, sim.walls.row(wall)
     if w.side[row]:
         raise CommandError(

@@ -32,7 +32,7 @@ class LexicalError(ValueError):
 
 @dataclass(frozen=True)
 class Word:
-    """Something that may be a keyword."""
+    """Word that may be a keyword."""
 
     text: str
 

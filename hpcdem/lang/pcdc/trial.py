@@ -111,8 +111,8 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
     if name in MODELS:
         _changes(MODELS[name], given)
     elif name == "mechanical-move-boundary-constraint" and "type" in given:
-        kind, *way = given["type"]
-        if kind in (2, 3) and not (way and any(way[0])):
+        kind, *rest = given["type"]
+        if kind in (2, 3) and not (rest and any(rest[0])):
             raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
     elif name in ("mechanical-velocity-boundary-condition", t.BOLT_VELOCITY.keyword.name):
         for axis in "xyz":

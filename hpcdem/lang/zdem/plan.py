@@ -24,7 +24,7 @@ Velocity = tuple[float | None, float | None]
 
 @dataclass(frozen=True)
 class Run:
-    """One CYC or IMPLE. index: of its statement; start: step it begins at; steps: how many; None where unknown.
+    """One CYC or IMPLE. index: of its statement; start: step it begins at; steps: number of steps; None where unknown.
 
     every: steps between outputs of each of OUTPUTS, 0 is off, None unknown; counted from step 0 for CYC, from the start
     of the command for IMPLE, which also writes a frame at its end.

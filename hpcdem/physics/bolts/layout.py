@@ -15,9 +15,9 @@ from hpcdem.core.errors import CommandError
 MOST = 100_000
 """Largest number of segments of one bolt."""
 SHORTEST = 0.1
-"""Crossings of edges that are nearer to each other than this part of the mean edge count once."""
+"""Fraction of the mean edge: crossings of edges that are nearer to each other count once."""
 INSIDE = 1e-9
-"""Barycentric coordinates of points on an edge are as low as this below zero."""
+"""Tolerance of barycentric coordinates: points on an edge may have coordinates as low as minus this."""
 
 
 def checked(points: Sequence[Sequence[float]], dim: int) -> np.ndarray:

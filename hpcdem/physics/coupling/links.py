@@ -27,7 +27,7 @@ from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.simulation import Blocks
 
 TO_DISCS, TO_FACES = 41, 42
-"""Tags of messages."""
+"""MPI tags of the messages to discs and to faces."""
 
 
 @dataclass

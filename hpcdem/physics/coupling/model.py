@@ -36,7 +36,7 @@ __all__ = ["Coupled"]
 MARGIN = 0.5
 """Largest displacement of discs and faces towards each other between two searches, over the largest radius."""
 SAFETY = 0.8
-"""Part of the stability limit that is used."""
+"""Fraction of the stability limit that is used as time step."""
 ON_DISCS, ON_FACES = 0, 1
 """The two sides of the work done across the contacts."""
 

@@ -20,7 +20,7 @@ from hpcdem.physics.dem.kernels import energy, mass
 from hpcdem.physics.dem.simulation import Simulation
 
 EMPTIED = 512
-"""Steps after which bins are emptied into integers: long before they are full."""
+"""Number of steps after which the bins of exact sums are emptied into integers, long before they are full."""
 
 
 # Called with the tuple of _wall_slots, which mypy cannot count.

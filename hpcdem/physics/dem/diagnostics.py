@@ -280,7 +280,8 @@ def stiffest_bond(sim: Simulation) -> float:
 
 
 MOST_LANCZOS, EVERY_LANCZOS = 60, 5
-"""Largest number of products with the stiffness, and number between checks of convergence of the frequency."""
+"""Largest number of products with the stiffness, and number of products between checks of the convergence of the
+frequency."""
 
 
 def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:

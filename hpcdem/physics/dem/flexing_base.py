@@ -21,13 +21,13 @@ from hpcdem.physics.dem.diagnostics import AT_X, FORCE_Y
 from hpcdem.physics.dem.flexure import Plate
 
 SAMPLES = 10
-"""Samples of the load in an interval."""
+"""Number of samples of the load in an interval."""
 SHORTEST = 4
-"""Steps of an interval at least."""
+"""Smallest number of steps of an interval."""
 SLOWLY = 1e-3
-"""Largest radius over which a base moves in a step, unless its speed is given."""
+"""Displacement of the base in a step over the largest radius, unless the speed of the base is given."""
 STEEP = 0.1
-"""Slope from which plate theory is inaccurate."""
+"""Slope above which plate theory is inaccurate."""
 _TABLES = ("shape", "before", "goal", "loads", "sums", "reference")
 
 

@@ -13,13 +13,14 @@ import numpy as np
 
 FREE, CLAMPED, INFINITE = "free", "clamped", "infinite"
 ENDS = {FREE: FREE, "broken": FREE, CLAMPED: CLAMPED, "fixed": CLAMPED, INFINITE: INFINITE}
-"""Conditions of an end by the words for them. A broken plate ends in a free end: without moment or shear force."""
+"""Conditions of an end by the words of the command. At the end of a broken plate there is neither moment nor shear
+force."""
 _BEAM = ((12.0, 6.0, -12.0, 6.0), (6.0, 4.0, -6.0, 2.0), (-12.0, -6.0, 12.0, -6.0), (6.0, 2.0, -6.0, 4.0))
 _BED = ((156.0, 22.0, 54.0, -13.0), (22.0, 4.0, 13.0, -3.0), (54.0, 13.0, 156.0, -22.0), (-13.0, -3.0, -22.0, 4.0))
 _POWER = np.array([[0, 1, 0, 1], [1, 2, 1, 2], [0, 1, 0, 1], [1, 2, 1, 2]])
 """Powers of the length in the rows and columns of slopes."""
 _ABOVE = 3
-"""Diagonals above the main one."""
+"""Number of diagonals above the main diagonal."""
 
 
 def rigidity_of(young: float, poisson: float, thickness: float) -> float:

@@ -88,7 +88,7 @@ def name_slipped(sim: Any) -> None:
         sim.halo.fill(chain)
         for k in range(0, chain.shape[1], 2):
             sim.halo.move_images(chain[:, k:], period=sim.rebuild_state.period if k % 4 else 0.0)
-    paths = np.where(mine[:, None], walls.ways(), np.nan)
+    paths = np.where(mine[:, None], walls.paths(), np.nan)
     kinds = slips.found(sim.lists, p.hot, origin, chain, walls.table()[:, :4].copy(), paths)
     if not sim.comm.any(bool(kinds.any())):
         return

@@ -14,7 +14,7 @@ from hpcdem.core.material import PROPERTIES
 OWN = tuple(f"own{k}" for k in range(8))
 """Columns for the properties that a user law declares, in their order."""
 MOST_LAWS = 64
-"""Laws of the user in a model."""
+"""Largest number of user laws in a model."""
 _FIRST = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "hertz", "xp", "yp", "law", *OWN)
 MATERIAL = np.dtype([(name, "f8") for name in (*_FIRST, *(name for name in PROPERTIES if name not in _FIRST))])
 """Properties of `core.material`; 1 for the Hertz-Mindlin law; number of the user law (user_laws.py), and its

@@ -20,7 +20,7 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.dem import diagnostics, periodic
 
 COMPONENTS = {"sxx": (X, X), "syy": (Y, Y), "sxy": (X, Y)}
-"""Direction of the force and of the normal of the plane."""
+"""Direction of the force and direction of the normal of the plane, by component."""
 
 
 def heights(sim: Any, y: tuple[float, float] | None = None) -> tuple[float, float]:

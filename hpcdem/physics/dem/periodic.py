@@ -30,7 +30,7 @@ LAPS = "laps"
 FIELDS = {LAPS: ("1", "crossings of the periodic sides to the right; x + laps * period is continuous", 0.0)}
 FASTEST = 4096.0
 FEWEST = 3
-"""Columns at least: with fewer a particle could meet another one on both sides."""
+"""Smallest number of columns of cells: with fewer, a particle could meet another one on both sides."""
 
 
 def spacing(left: float, length: float) -> float:

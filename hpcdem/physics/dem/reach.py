@@ -18,9 +18,10 @@ from hpcdem.physics.dem.kernels import fast, neighbours
 from hpcdem.physics.dem.kernels.fast import Fast
 
 NARROW, WIDE = 0.3, 0.6
-"""Skin over the largest radius, at rest and in fast motion."""
+"""Width of the skin over the largest radius, at rest and in fast motion."""
 SHORT_LIVED, LONG_LIVED = 60, 200
-"""Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
+"""Ages of neighbour lists, in steps: lists that lasted a shorter time call for the wide skin, lists that lasted longer
+for the narrow one."""
 EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
 Box = tuple[float, float, float, float]
 

@@ -125,7 +125,7 @@ class Rolling:
         return float(sim.comm.max_into(np.array([self._over_inertia(sim, pairs, walls).max(initial=0.0)]))[0])
 
     def _pieces(self, sim: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray, int, int]]:
-        """Of each block: its slots, their rows and partners, first and last owned row."""
+        """Yield of each block its slots, their rows and partners, first and last owned row."""
         lists = sim.lists
         for t, (row, partner, first, last) in enumerate(lists.pieces()):
             begin = lists.ptr[lists.blocks.poff[t]]

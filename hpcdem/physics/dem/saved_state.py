@@ -150,7 +150,8 @@ def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
 
 
 MEMORY = "memory"
-"""Columns of what contacts remember of a user law or of rolling begin so, in the tables of pairs and wall contacts."""
+"""Beginning of the names of the columns that hold what contacts keep for a user law or for rolling resistance, in the
+tables of pairs and of wall contacts."""
 CLUMP_STATE = {
     "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
     "inertia": MOMENT,

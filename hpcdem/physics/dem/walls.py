@@ -35,10 +35,10 @@ class Walls:
         self.far = (0.0, 0.0)
         """x of the ends of walls without an end [m]: past those of all particles."""
         self.travel = np.empty((0, 2))
-        """Way of each wall since the contact lists were built [m]."""
+        """Path of each wall since the contact lists were built [m]."""
         self.whole = np.empty(0, np.int64)
         self.bend, self.bent = np.empty((0, 2)), np.empty((0, 2))
-        """bent: way of P1 and P2 in y besides `travel` [m]."""
+        """bent: path of P1 and P2 in y besides `travel` [m]."""
 
     COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel", "whole", "bend",
                "bent", "around")  # fmt: skip
@@ -197,14 +197,14 @@ class Walls:
         """Return whether a wall has a velocity."""
         return bool(self.v.any() or self.bend.any())
 
-    def ways(self) -> np.ndarray:
-        """Way of the middle of each wall since the lists were built (n, 2) [m]."""
-        ways = self.travel.copy()
-        ways[:, 1] += 0.5 * self.bent.sum(axis=1)
-        return ways
+    def paths(self) -> np.ndarray:
+        """Path of the middle of each wall since the lists were built (n, 2) [m]."""
+        paths = self.travel.copy()
+        paths[:, 1] += 0.5 * self.bent.sum(axis=1)
+        return paths
 
     def list_built(self) -> None:
-        """Begin to count the ways of walls at the present positions."""
+        """Begin to count the paths of walls at the present positions."""
         self.travel[:], self.bent[:] = 0.0, 0.0
 
     def at_last_list(self) -> tuple[np.ndarray, np.ndarray]:
@@ -215,7 +215,7 @@ class Walls:
         return p1, p2
 
     def longest_travel(self) -> float:
-        """Largest way of any wall since the lists were built [m]."""
+        """Longest path of any wall since the lists were built [m]."""
         return _longest(self.travel, self.bent)
 
     def fastest(self) -> float:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 FAR, GONE = 0.1, 1.0
-"""Slip or opening, relative to the size of a joint, that is reported in the log, and at which the run ends."""
+"""Slips or openings, relative to the size of a joint: from the first one on the log reports them, at the second one the
+run ends."""
 
 
 def part(sim: State, local: Local) -> float:

@@ -37,9 +37,10 @@ from hpcdem.physics.fdem.user_functions import FUNCTIONS
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
 """Components of stress, in the order of all tables, by dimensions of space."""
 ACROSS = 3
-"""Place of zz there."""
+"""Index of the component zz in that order."""
 Column = tuple[Any, ...]
-"""Name of an array of rows of tables, and where objects have theirs in it: places (n,), of joints on both sides."""
+"""Name of an array of the rows of tables, and the columns in which objects store their row: indices (n,), of joints on
+both sides."""
 SLIDING = (COULOMB_JOINT.name, BARTON_BANDIS.name)
 """Models of joints that slide and never break."""
 

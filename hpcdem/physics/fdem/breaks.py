@@ -12,7 +12,8 @@ from hpcdem.physics.fdem.state import Crack
 from hpcdem.physics.fdem.topology import AGAIN
 
 MANY = 2000
-"""Share of opened faces, one in so many, from which half of the memory pages with states of faces are a rank's own."""
+"""Reciprocal of a share of opened faces: from one face in this many on, about half of the memory pages with states of
+faces are private to a rank."""
 
 
 def waiting(sim: Any) -> list[Crack]:

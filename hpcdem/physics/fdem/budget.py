@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 STORED = ("kinetic", "strain", "joints")
 WORK = ("joints", "contact", "viscous", "gravity", "outside", "plastic", "creep")
-"""Columns of energy.WORK by name, and what plastic flow and creep lose, which elements carry with what they remember of
-it."""
+"""Names of the columns of energy.WORK, and of the work lost by plastic flow and by creep, which elements carry with
+their state of plasticity."""
 
 
 class Budget(engine.Budget["Blocks", float]):

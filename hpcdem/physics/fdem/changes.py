@@ -20,8 +20,9 @@ from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"
 TORN = 0.1
-"""Limit of tearing: where the corners that meet in a point are farther apart than this much of the mean edge, the body
-is torn there: elements that come back are not connected with it. Others may reach into them by as much."""
+"""Limit of tearing: where the corners that meet in a point are farther apart than this fraction of the mean edge, the
+body counts as torn, and elements that are filled in again are not connected with it. The overlap of others with them
+may be as large."""
 
 
 def crack(sim: Blocks, joints: Numbers) -> None:
@@ -116,9 +117,9 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
     known = (np.bincount(point, minlength=n_points) > 0) & (apart <= allowed)
     given = np.hstack([rim - mesh.points, _weighted(u, one, point, n_points), _weighted(v, mass[use], point, n_points)])
     found = backfill.extended(mesh.points, own, known, given) if sim.comm.rank == 0 else None
-    way, shown, speed = np.split(sim.comm.bcast(found), 3, axis=1)
+    offset, shown, speed = np.split(sim.comm.bcast(found), 3, axis=1)
     real = own >= 0
-    places = np.where(real[:, :, None], (mesh.points + way)[own], 0.0)
+    places = np.where(real[:, :, None], (mesh.points + offset)[own], 0.0)
     _refuse_overlap(sim, back, places, allowed)
 
     sim.before_change()

@@ -14,19 +14,20 @@ from hpcdem.physics.fdem.kernels import joint_law
 from hpcdem.physics.fdem.simulation import Blocks
 
 RATIO = 1e-5
-"""Balance at which a model counts as being at rest, if nothing else is requested."""
+"""Ratio of unbalanced forces at which a model counts as being in equilibrium, if no other is requested."""
 EVERY = 50
-"""Steps between two looks at the balance."""
+"""Number of steps between two evaluations of the balance."""
 WINDOW = 20_000
-"""Static steps, at least, in which the balance must get better."""
+"""Smallest number of static steps within which the balance must improve."""
 CROSSINGS = 10.0
-"""Least window in times that a wave takes to cross the model and return."""
+"""Smallest window, in times that a wave takes to cross the model and return."""
 BETTER = 0.9
-"""Part of the least ratio so far that counts as progress."""
+"""Fraction of the smallest ratio so far below which a ratio counts as progress."""
 SLIDES = 0.2
-"""Share of the mean velocity of a body that all its corners must have to count as sliding; held corners do not move."""
+"""Fraction of the mean velocity of a body that all its corners must have for the body to count as sliding; fixed
+corners do not move."""
 LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
-"""Steps after which a run towards a ratio has failed, if nothing else is given."""
+"""Numbers of steps after which a run towards a ratio has failed, static and dynamic, if no other limit is given."""
 
 
 @dataclass(frozen=True)

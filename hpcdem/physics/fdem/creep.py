@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 RANGE = 100.0
-"""Creep steps that adapt stay within the given one over and times this, unless other bounds are given."""
+"""Factor of the bounds of adaptive creep steps: the given step over this, and times this, unless other bounds are
+given."""
 FASTEST = 2.0
-"""Largest ratio of one creep step to the one before."""
+"""Largest ratio of a creep step to the one before."""
 FULL = 1.0 - 1e-9
-"""A creep step this near to the end goes there."""
+"""Fraction of the remaining time from which on a creep step is extended to the end."""
 PER_STEP = ", which in static runs acts per step and not in creep time: use a dynamic run"
 
 

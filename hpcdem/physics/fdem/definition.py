@@ -107,7 +107,7 @@ class ModelDefinition(Conditions):
 
 
 _OPEN = {"least": -math.inf, "greatest": math.inf}
-"""Infinite defaults, stored as null because JSON has no infinity."""
+"""Infinite default values, which are stored as null because JSON has no infinity."""
 
 
 def _plain(field: dict[str, Any]) -> dict[str, Any]:

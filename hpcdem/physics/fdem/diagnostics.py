@@ -60,7 +60,7 @@ def _vector(name: str, on: str, unit: str, doc: str, framed: bool = True) -> dic
 
 
 LENGTHS = {"displacement": "m", "velocity": "m/s"}
-"""Vectors of nodes whose lengths are quantities too."""
+"""Vectors of nodes whose magnitudes are quantities too, with their units."""
 
 QUANTITIES: dict[str, Quantity] = {
     **{
@@ -178,7 +178,8 @@ PROPERTIES = {
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in OF_JOINTS.properties},
 }
-"""Properties of elements and joints, by their names as quantities. In frames if they differ from object to object."""
+"""Properties of elements and joints, by their names as quantities. Frames contain them if they differ between
+objects."""
 for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)), ("joint", (OF_JOINTS,))):
     for _quantity, _name in PROPERTIES[_on].items():
         _model = next(m for m in _models if m.has(_name))
@@ -188,7 +189,7 @@ for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURG
         )  # fmt: skip
 
 JOINT_SIZE = {2: "length", 3: "joint_area"}
-"""The quantity that says how large a joint is."""
+"""Name of the quantity that is the size of a joint, by dimension."""
 _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
 _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for point in ("first", "middle", "last"))
 

@@ -53,33 +53,33 @@ from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.simulation import Blocks
 
 AIM = 1e-12
-"""Balance that is aimed at; rounding ends the iteration where coordinates are large."""
+"""Target of the ratio of unbalanced forces; rounding ends the iteration earlier where coordinates are large."""
 ENOUGH = 1e-8
-"""Balance that must be reached, unless something else is requested."""
+"""Ratio of unbalanced forces that must be reached, unless another one is requested."""
 MOST = 60
-"""Iterations after which there is no hope."""
+"""Number of iterations after which the increment is given up."""
 RENEW = 0.1
-"""The matrix is made again when an iteration leaves more than this part of the unbalanced forces."""
+"""Fraction of the unbalanced forces: the matrix is assembled again when an iteration leaves more than this."""
 TOUCH = 1e-9
-"""Contact forces over all forces above which surfaces count as touching."""
+"""Contact forces over all forces above which surfaces count as being in contact."""
 WORST = 1e-3
-"""Worst balance that is put down to rounding."""
+"""Largest ratio of unbalanced forces that is attributed to rounding."""
 HALVINGS = 8
 """Largest number of halvings of the increment of an iteration before it is given up."""
 CUTS, FINE = 6, 10
-"""Largest number of halvings of a load increment without equilibrium; the same where joints soften."""
+"""Largest number of halvings of a load increment without equilibrium, and the same where joints soften."""
 TRIES = 3
-"""Number of elastic iterations of an increment that may increase the unbalanced forces."""
+"""Number of elastic iterations of an increment that need not reduce the unbalanced forces."""
 STILL = 1e-6
-"""Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
-strength that follows tables, quads."""
+"""Change of stress by plastic flow, over the largest stress, that is neglected where one return makes another one
+necessary: strengths that follow tables, quads."""
 MUCH = 1e-3
 """Change of stress at the beginning, from which on elements are outside by what was set since they last flowed: then
 they flow at the whole load only, however many increments lead there."""
 BEFORE, AFTER = "temperature before", "temperature after"
 """Columns of elements during a solve: temperatures of the last balance, and those of this one."""
 PASSES = 100
-"""Largest number of equilibria at one load, each after the flow of the one before."""
+"""Largest number of equilibria at one load; each follows the plastic flow after the one before."""
 TANGENT = {2: "tangent", 3: "tangent-space"}
 SOLVERS = ("auto", "direct", "petsc")
 
@@ -124,8 +124,8 @@ class Nodes:
     x: np.ndarray
     v: np.ndarray
     least: float = 0.0
-    """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none, nor does
-    heat in a body that is free to expand."""
+    """Smallest sum of forces [N/m] to which the unbalanced forces are compared: joints that break may leave none, nor
+    does heat in a body that is free to expand."""
     nothing: float = 0.0
     """Sum of forces below which the model is unloaded, see floors.py."""
 

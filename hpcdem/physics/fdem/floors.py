@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 NOTHING = 1e-9
-"""Strain below which loads are nothing: 50 Pa in hard rock."""
+"""Strain below which loads are neglected: it corresponds to 50 Pa in hard rock."""
 
 
 def nothing(sim: Blocks) -> float:

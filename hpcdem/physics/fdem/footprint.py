@@ -9,7 +9,7 @@ EMPTY = 140e6
 OWN = {2: 650.0, 3: 660.0}
 """Memory of an owned element, by dimensions [B], in space without joints."""
 OF_JOINTS = 140.0
-"""More of an element in space with joints before their peak [B]."""
+"""Additional memory of an element in space with joints before their peak [B]."""
 GHOST = {False: 320.0, True: 470.0}
 """What ranks in space have beyond their even share, per ghost of `ghosts`, without and with joints [B]: ghosts, forces
 of other ranks, contacts on both sides and their exchange; in the plane these are few."""
@@ -18,8 +18,7 @@ LAYER = 1.75
 NODE = {2: 205.0, 3: 230.0}
 """Memory of a node of the machine per element [B]: mesh, connectivity, the definition of the model."""
 REBUILDING = {2: 2.3, 3: 1.3}
-"""A rank takes so many times its own memory, by dimensions, while storage is made again: old and new positions are
-there at once."""
+"""Factor of the memory of a rank while its storage is renewed, by dimension: old and new arrays exist at once."""
 MAKING = 330.0
 """Memory of the first rank of a node per element, while the mesh and its connectivity are made [B]."""
 

@@ -23,9 +23,9 @@ FLOW = {FLOW_NODE: NODE, CHANNEL: JOINT}
 """Kinds of objects whose numbers, groups and positions are those of nodes and joints."""
 KINDS = (ELEMENT, NODE, FACE, JOINT, *SUPPORTS)
 SHOWN = {"elements": ELEMENT, "joints": JOINT, "channels": CHANNEL}
-"""Objects of a picture that a range chooses among."""
+"""Kinds of objects of a picture from which a range can choose."""
 DEFAULT = "default"
-"""The set of groups that name none."""
+"""Set of groups whose set is not named."""
 
 
 class Groups:

@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.physics.fdem import tetrahedra
 
 PARTS = 6
-"""Tetrahedra of a hexahedron in the mesh."""
+"""Number of tetrahedra of a hexahedron in the mesh."""
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 """Corners of the sides, counter-clockwise as seen from outside."""
 DIAGONAL, LONE = 5.0 / 36.0, -1.0 / 36.0

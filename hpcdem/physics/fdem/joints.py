@@ -219,7 +219,7 @@ class JointTables:
         those that its kernel knows, if they are not the same. of_sides: they are the second of `joints`."""
         if of_sides and self.sides is not None:
             of = np.searchsorted(self.sides.slot, slots)
-            return self.sides.corners(of), self.sides.ways(of)
+            return self.sides.corners(of), self.sides.motions(of)
         face, corners = self.slot_face[slots], self.sim.the_mesh().face_corners
         return np.column_stack([corners(faces) for faces in (face, self.sim.partner[face])]), None
 

@@ -12,7 +12,7 @@ from hpcdem.physics.fdem.kernels.joints import NONE
 from hpcdem.physics.fdem.tetrahedra import FACES, ROW, STRIDE
 
 OPPOSITE = np.array([0, 2, 1])
-"""Corners of p, q, r of the other side that are opposite a, b, c."""
+"""Corners p, q, r of the other side that lie opposite a, b, c."""
 
 
 class HexJoints:
@@ -73,8 +73,8 @@ class HexJoints:
         near, far = at[:, :4], at[:, 4:]
         g, e = self.weights[which, :4, None], self.weights[which, 4:7, None]
         u = g * (far - near)
-        way = e * (0.5 * ((u[:, 0] + (u[:, 1] + u[:, 2])) + u[:, 3]))[:, None]
-        x = np.concatenate([near[:, :3] + way, (far[:, :3] - way)[:, OPPOSITE]], axis=1)
+        shift = e * (0.5 * ((u[:, 0] + (u[:, 1] + u[:, 2])) + u[:, 3]))[:, None]
+        x = np.concatenate([near[:, :3] + shift, (far[:, :3] - shift)[:, OPPOSITE]], axis=1)
         corner = np.arange(18 * n).reshape(n, 6, 3)[:, :, 0]
         slots = self.slot[which]
         return Joints(
@@ -82,7 +82,7 @@ class HexJoints:
             local.slot_state[slots], local.slot_history[slots], x.reshape(-1),
         )  # fmt: skip
 
-    def ways(self, which: np.ndarray) -> np.ndarray:
+    def motions(self, which: np.ndarray) -> np.ndarray:
         """(n, 18, 24): how the corners a, b, c, p, q, r of `moved` move with a, b, c, d of the side and the four
         opposite to them."""
         g, e = self.weights[which, :4], self.weights[which, 4:7]

@@ -17,14 +17,15 @@ from hpcdem.core.comm import Comm
 from hpcdem.core.errors import CommandError
 
 MANY = 400_000
-"""Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
+"""Number of unknowns from which PETSc is used if it is installed: SuperLU then needs minutes and several GB on one
+rank."""
 MANY_IN_SPACE = 20_000
-"""Unknowns from which PETSc is used in space, where factors fill up sooner."""
+"""Number of unknowns from which PETSc is used in space, where the factors fill in earlier."""
 COARSEST = 1500
 """Unknowns up to which multigrid solves its coarsest grid directly: more levels, as by default of PETSc (50), need more
 iterations, and the more the more ranks there are."""
 CONDENSED = 2000
-"""Largest number of unknowns of joints and fluid for dense matrices."""
+"""Largest number of unknowns of joints and fluid for which dense matrices are used."""
 SINGULAR = (
     "the stiffness matrix is singular: part of the model can move without resistance (an open joint without tensile "
     "strength, or properties that differ by more than 1e15)"
@@ -58,7 +59,7 @@ class Unknowns:
     basis: np.ndarray
     given: np.ndarray
     oblique: np.ndarray
-    """(nn,) bool: nodes whose basis is not the axes."""
+    """(nn,) bool: nodes whose constrained directions are not the axes."""
 
     @property
     def count(self) -> int:

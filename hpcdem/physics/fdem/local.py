@@ -66,7 +66,7 @@ class Local(JointTables):
     dim, force_width, stride, listed = 2, elements.FORCE, 2, 3 * elements.BLOCK
     corner_masses = staticmethod(Masses.of_corners)
     whole: SixNodes | None = None
-    """Macro-elements of the plane, whose forces stand in place of those of their parts."""
+    """Macro-elements of the plane, whose forces replace those of their parts."""
     awaited = False  # whether a history reads their forces in the next step
     solids: Solids
     masses: Masses

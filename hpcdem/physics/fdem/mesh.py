@@ -25,9 +25,9 @@ from hpcdem.physics.fdem.elements.kind import HEXAHEDRON, MACROS, Kind
 
 CONNECTIVITY = {2: connectivity, 3: tetrahedra}
 FLAT = 1e-9
-"""A corner spans less than this much of the square of the longest edge: the element is flat."""
+"""Fraction of the square of the longest edge: an element with a corner that spans less area is flat."""
 MANY = 1 << 16
-"""Elements or faces that are checked together: what is known of all of them at once would take more memory than the
+"""Number of elements or faces that are checked together: checking all of them at once would take more memory than the
 mesh."""
 SAME = 1e-9
 """Points nearer than this part of the shortest edge are one point."""

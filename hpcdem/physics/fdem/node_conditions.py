@@ -21,7 +21,7 @@ Number = float | str
 """A value of a condition: a number, the name of a table of values over model time, or of a function of place and time
 (user_functions.py)."""
 STRAIGHT = 1e-9
-"""Sine of the angle below which directions are the same."""
+"""Sine of the angle below which two directions count as the same."""
 
 
 class Contradiction(Exception):

@@ -22,13 +22,14 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 ROUNDING = 1e-5
-"""Overlap over the size of the smaller element that is put down to the rounding of coordinates."""
+"""Overlap over the size of the smaller element that is attributed to the rounding of coordinates."""
 DEEP = 0.1
-"""Overlap over an altitude that is too much: at a third contact lets go of what comes further in."""
+"""Largest admissible overlap over an altitude of the element: beyond a third, the contact no longer pushes surfaces
+apart."""
 AGAIN = 1.5
 """Factor of growth after which an overlap is reported again."""
 NAMED = 5
-"""Places that a message names."""
+"""Number of positions that a message names."""
 
 
 def check(sim: State, local: Local) -> None:

@@ -31,21 +31,22 @@ class Property:
     low: float = 0.0
     high: float = math.inf
     low_itself: bool = True
-    """The lowest value is allowed itself."""
+    """Whether the lowest value itself is allowed."""
     optional: bool = False
-    """May be left out without a default: it then follows from several others."""
+    """Whether it may be omitted without a default value: it then follows from several others."""
     softens: bool = False
-    """A table over plastic strain may stand for it."""
+    """Whether it may follow a table over plastic strain."""
     temperature_dependent: bool = False
-    """A table over temperature may stand for it."""
+    """Whether it may follow a table over temperature."""
     internal: bool = False
-    """Given by the program, not by name."""
+    """Whether it is set by the program, and cannot be given by name."""
     otherwise: str = ""
     """What counts where it is left out, if that is no number; commands see to what does not follow from others."""
     dims: tuple[int, ...] = (2, 3)
-    """Dimensions of space in which it is there."""
+    """Dimensions of space in which it exists."""
     follows: str = ""
-    """The property whose value it has where it is left out; it goes with that one as long as both are equal."""
+    """Property from which it takes its value where it is omitted; it changes with that one as long as both are
+    equal."""
 
     def check(self, value: float) -> float:
         """The value as a float; CommandError if it cannot be."""
@@ -185,7 +186,8 @@ def _friction(doc: str, softens: bool = False) -> Property:
 
 
 SOFTENS = ("cohesion", "friction", "dilation", "tensile")
-"""Properties for which a table over plastic strain may stand. `softening_table` of them is its number, 0: none."""
+"""Properties that may follow a table over plastic strain. The number of the table is their `softening_table`, 0:
+none."""
 
 
 def softening_table(name: str) -> str:
@@ -334,7 +336,7 @@ KELVIN_STRAIN = {
     2: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy"),
     3: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy", "kelvin_strain_xz", "kelvin_strain_yz"),
 }
-"""Components that a command assigns, in the plane and in space; zz follows."""
+"""Components that a command assigns, in the plane and in space; zz follows from them."""
 MECH_BURGERS = Model(
     "mech_burgers",
     ELEMENT,

@@ -12,7 +12,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.topology import Topology, finite
 
 SAFETY = 0.8
-"""Part of the stability limit that is used as time step."""
+"""Fraction of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """Treatment of bodies that overlap before the first step."""
 DEEP_OVERLAP = WARN, STOP = "warn", "stop"

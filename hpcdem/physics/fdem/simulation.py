@@ -54,9 +54,10 @@ MARGIN = 0.6
 SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
-"""Storage is made again at this age even if nobody moved, so that borders can follow the load."""
+"""Age in steps at which storage is renewed even if nothing has moved, so that the borders of the ranks can follow the
+load."""
 LARGE = 10_000
-"""Elements of a rank whose tables of the last storage are worth giving back to the system."""
+"""Number of elements of a rank from which the memory of the tables of the last storage is returned to the system."""
 OUTSIDE, MUCH = 1e-6, 1e-3
 """Part of its largest component by which a stress must be beyond the strength to be spoken of: one that was given, one
 that relaxation begins with."""

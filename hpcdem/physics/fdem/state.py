@@ -110,16 +110,16 @@ class State(ModelDefinition, Model):
     areas: np.ndarray
     """Areas of the elements of the model [m2]."""
     cut: np.ndarray
-    """Along which diagonal quads are cut for contact, see `pairs.cut_corner`."""
+    """Diagonal along which each quad is cut for contact, see `pairs.cut_corner`."""
     node: np.ndarray
-    """(4 ne,) which corners move as one node; -1: none."""
+    """(4 ne,) number of the node to which each corner belongs; -1: none."""
     shared_nodes: np.ndarray
     """Flags of nodes with several corners, bool."""
     member_begin: np.ndarray
     """Offsets of the corners of each node with several in `member`."""
     member: np.ndarray
     point_corners: np.ndarray
-    """(np,) corners of elements that are there at each point of the mesh."""
+    """(np,) number of corners of present elements at each point of the mesh."""
     opened_apart: int = 0
     """Joints opened in place since `share_changes`: each rank has pages of its own for them."""
     origin: np.ndarray
@@ -204,7 +204,7 @@ class State(ModelDefinition, Model):
         return self.comm.per_node(make)
 
     ahead: int = 0
-    """Static steps that are about to be done at once."""
+    """Number of static steps that will be done without an evaluation between them."""
 
     def time_now(self) -> float:
         """Return the argument of tables and functions of conditions of blocks, bolts and liners: model time [s]; in

@@ -13,7 +13,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fields import FIELDS
 
 ORDER = ("discs", "fluid", "proppant", "heat", *FIELDS, "bolts", "liners", "free_field", "water")
-"""In which they are added up, whoever came first: sums keep their bits."""
+"""Order in which the loads are added up, independent of the order in which they were created: sums are then equal to
+the bit."""
 SHARED_OUT = ("flow_nodes", "proppant_nodes", "fluid_heat")
 """Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""
 
@@ -28,9 +29,9 @@ class SurfaceLoad(ABC):
     kernel_kind: ClassVar[str] = ""
     """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
     of_both: ClassVar[bool] = False
-    """They are the same in the plane and in space."""
+    """Whether the kernels are the same in the plane and in space."""
     own_clock: ClassVar[bool] = False
-    """Its conditions follow tables over a time of its own, which passes where blocks are at rest too."""
+    """Whether its conditions follow tables over a time of its own, which also passes where blocks are at rest."""
 
     @property
     def keeps_time(self) -> bool:
@@ -54,7 +55,7 @@ class SurfaceLoad(ABC):
 
     @classmethod
     def new(cls, blocks: Any) -> Self:
-        """One for a model that has none. Not collective."""
+        """Create the load for a model that has none. Not collective."""
         return cls(blocks)  # type: ignore[call-arg]
 
     @property
@@ -113,8 +114,8 @@ class SurfaceLoad(ABC):
         return np.empty(0), np.empty(0)
 
     def work_done(self) -> float:
-        """On the blocks since the account of energy began, as far as it keeps an account by itself; equal on all
-        ranks [J/m]."""
+        """Return the work done on the blocks since the energy budget began, if the load keeps its own account; equal on
+        all ranks [J/m]."""
         return 0.0
 
     def elements_removed(self, elements: np.ndarray) -> None:  # noqa: B027 - most have nothing to do here
@@ -234,7 +235,7 @@ class SurfaceLoads:
         return [one for one, _ in found], [other for _, other in found]
 
     def work_done(self) -> dict[str, float]:
-        """On the blocks, by name, of those that keep an account by themselves [J/m]. Not collective."""
+        """Return the work done on the blocks by each load that keeps its own account, by name [J/m]. Not collective."""
         return {load.name: load.work_done() for load in self._loads}
 
     def elements_removed(self, elements: np.ndarray) -> None:

@@ -31,17 +31,18 @@ class Topology:
     alive: np.ndarray
     """(ne,) bool: elements that are present (not excavated)."""
     touches: np.ndarray
-    """(ne,) bool: elements that have contact."""
+    """(ne,) bool: elements that take part in contact."""
     joint_row: np.ndarray
     """(4 ne,) row of the joint models, of both faces of a joint; 0: none."""
     open: np.ndarray
-    """(4 ne,) bool: faces that do not hold on to their partner (any more): broken, cracked, or it was removed."""
+    """(4 ne,) bool: faces that are not joined to their partner (any more): broken, cracked, or the partner was
+    removed."""
     broken: np.ndarray
     """(4 ne,) by the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
     slid: dict[int, tuple[float, ...]]
     """History of the slip of broken joints by face, at three points [m], see pressed.py."""
     born: np.ndarray
-    """Elements that came back after they were removed, ascending."""
+    """Elements that were filled in again after they had been removed, ascending."""
     birthplace: np.ndarray
     """Positions of their corners at that time (n, 4, dim) [m]."""
 

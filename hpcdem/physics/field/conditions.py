@@ -33,15 +33,15 @@ class Conditions(Assigned, Field):
     exposed: conditions of faces."""
 
     quantity: ClassVar[str]
-    """Quantity of the field, and name of the column of elements with its values at their corners."""
+    """Quantity of the field, which is also the name of the column of elements with its values at their corners."""
     unstressed: ClassVar[str]
     """Column of elements: the mean value at which one is free of the stress that the field brings."""
     several: ClassVar[str] = "values"
     low_to_high: ClassVar[str] = "lower to the higher"
     otherwise: ClassVar[str] = ""
-    """Further advice of messages about a time step that is too long."""
+    """Further advice in messages about a time step that is too long."""
     expansion: ClassVar[str] = ""
-    """Property: linear expansion with it; none: it brings no stress."""
+    """Name of the property that is the linear expansion with the field; empty: the field causes no stress."""
 
     def __init__(self, blocks: Blocks) -> None:
         super().__init__(blocks)

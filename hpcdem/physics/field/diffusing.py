@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 SAFETY = 0.9
-"""Part of the stability limit that an estimated sub-step may be."""
+"""Fraction of the stability limit up to which an estimated sub-step is accepted."""
 SPREAD = 0.1
-"""Largest distance of corners of one node in opening joints, over the mean edge."""
+"""Largest distance of the corners of one node in opening joints, over the mean edge."""
 
 
 class Diffusing(Conditions):
     """A field of a model of blocks. t (n, w): values at the corners of all elements held here; at: its nodes there."""
 
     kept: ClassVar[tuple[str, ...]] = ("switched_on", "own_steps", "own_dt")
-    """Attributes that checkpoints hold besides."""
+    """Attributes that checkpoints hold in addition."""
     at: Nodes
     conduction: Conduction
 
@@ -121,8 +121,8 @@ class Diffusing(Conditions):
         for k in range(4):
             there = cells[:, k] >= 0
             if there.any():
-                way = blocks.x[there, stride * k : stride * k + blocks.dim] - middle[there]
-                far[0] = max(far[0], float((way * way).sum(axis=1).max()))
+                offset = blocks.x[there, stride * k : stride * k + blocks.dim] - middle[there]
+                far[0] = max(far[0], float((offset * offset).sum(axis=1).max()))
         return 2.0 * math.sqrt(float(blocks.comm.max_into(far)[0])) + SPREAD * float(blocks.mean_edge)
 
     # ---- tables of this rank -------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 MANY = 100_000
-"""Sub-steps in a cycle that are too many to be meant."""
+"""Number of sub-steps in a cycle above which the input is taken for a mistake."""
 CHECK_EVERY = 100
 """Cycles after which a field is checked: whether it has blown up, and how long its sub-steps may be."""
 Tables = dict[str, dict[str, np.ndarray]]
@@ -40,7 +40,7 @@ class Assigned:
     """Name of the model in messages."""
     alike: ClassVar[tuple[str, ...]] = ()
     why_alike: ClassVar[str] = "all channels have the same fluid"
-    """Properties that all objects have alike."""
+    """Reason, in messages, why a property must be the same in all objects."""
     stiffens: ClassVar[bool] = False
     """Whether assignments change masses or time steps of the blocks."""
 

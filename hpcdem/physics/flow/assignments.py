@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 BY_CONDITION, BY_WELL = 1, 2
-"""Bits of what says that water stands before a face, should it be free."""
+"""Bits of the reasons why there is water in front of a face, should the face be free: a condition, a well."""
 
 
 def nodes_not(numbers: np.ndarray) -> str:
@@ -139,8 +139,8 @@ class FlowAssignments(Assigned, Field):
         viscous, on = of["viscosity"] * of["fluid_density"], of["leak_off"] > 0.0
         front = on & (of["matrix_saturation"] < 1.0)
         empty = of["matrix_porosity"] * (1.0 - of["matrix_saturation"])
-        room = np.where(front, 0.5 * empty, inside / math.pi)
-        leak = np.where(on, np.sqrt(of["matrix_permeability"] * room / viscous), 0.0)
+        volume = np.where(front, 0.5 * empty, inside / math.pi)
+        leak = np.where(on, np.sqrt(of["matrix_permeability"] * volume / viscous), 0.0)
         apertures = [of[f"aperature_{name}"] for name in ("initial", "minumum", "maximum")]
         dilation = np.tan(np.radians(of["shear_dilation"])), of["shear_dilation_limit"]
         return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"], *dilation, front]))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 _ACCOUNT = {"given": kernels.GIVEN, "leaked": kernels.LEAKED, "removed": kernels.REMOVED}
-"""Columns of nodes in the account."""
+"""Columns of the nodes in the fluid account."""
 
 
 class Slurry(Protocol):

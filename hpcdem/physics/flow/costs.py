@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from hpcdem.physics.flow.model import Flow
 
 SUB_STEP, CHANNEL = 15e-6, 11e-9
-"""Seconds of a sub-step of flow, and per channel of it."""
+"""Wall time of a sub-step of flow [s], and per channel of it."""
 STEP, ELEMENT = 20e-6, 70e-9
-"""Seconds of a step of blocks, and per element of it, with its joints."""
+"""Wall time of a step of blocks [s], and per element of it, with its joints."""
 ITERATION, UNKNOWN = 5e-3, 14e-6
-"""Seconds of an iteration of Newton's method, and per unknown of it: forces, matrix, factors."""
+"""Wall time of an iteration of Newton's method [s], and per unknown of it: forces, matrix, factors."""
 FORCES, DENSE = 4e-6, 3.3e-11
-"""Cost with condensed elements: seconds per unknown for forces and elimination, and per cube of what is left of
-them."""
+"""Wall time with condensed elements [s]: per unknown for forces and elimination, and per cube of the number of unknowns
+that remain."""
 ITERATIONS = 5
-"""Iterations of an implicit step."""
+"""Number of iterations of an implicit step that the estimate assumes."""
 LONG = 1800.0
-"""Seconds of an explicit run above which a warning precedes it."""
+"""Estimated wall time [s] of an explicit run above which a warning is issued."""
 
 
 @dataclass(frozen=True)

@@ -22,25 +22,29 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.system import Found, System
 
 CUTS = 1e-9
-"""Least part of the longest time step."""
+"""Smallest time step over the longest one."""
 EASY, HARD = 6, 12
-"""Iterations of a step after which the next one may be longer, must be shorter."""
+"""Numbers of iterations of a step: up to the first the next step may be longer, from the second on it must be
+shorter."""
 GROWTH, MOST_GROWTH = 1.4, 4.0
-"""Growth factor of the time step from one to the next where that is due, and the largest power of it."""
+"""Growth factor of the time step from one step to the next where growth is due, and the largest power of it."""
 FEW, PLENTY = 6, 10
-"""Time steps between the peak of a joint and that of the next: fewer make time steps shorter, more make them longer."""
+"""Numbers of time steps between the peak of a joint and that of the next: fewer make time steps shorter, more make them
+longer."""
 TOGETHER = 1e-3
-"""Part of the longest time step below which several joints may pass their peak in one, as where there is symmetry."""
+"""Fraction of the longest time step below which several joints may pass their peak in one step, as they do where there
+is symmetry."""
 MOST_STEADY = 100
-"""Time steps towards steady flow."""
+"""Largest number of time steps towards steady flow."""
 STEADY = 1e-9
-"""Storage over what flows, below which a flow is steady."""
+"""Storage over the flow, below which a flow counts as steady."""
 ROUNDING = 1e-14
-"""Change of pressures and saturations in a step, over the largest, that is none."""
+"""Change of pressures and saturations in a step, over the largest of them, that counts as none."""
 KEPT = 1e-6
-"""Change of the fluid in such a step, over all of it, that rounding of what flows may be."""
+"""Change of the mass of fluid in such a step, over the total mass, that is attributed to the rounding of flow rates."""
 QUIET = 8
-"""Steps without a change, each longer than the one before, after which nothing flows at all: that is steady too."""
+"""Number of steps without a change, each longer than the one before, after which the flow counts as steady because
+nothing flows."""
 
 
 class Coupled(System):

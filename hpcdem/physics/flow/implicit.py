@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.flow.model import Flow
 
 LEAST_PRESSURE = 1e4
-"""p0 is at least this [Pa]."""
+"""Smallest scale of pressure p0 [Pa]."""
 ROUNDING = 1e-8
 """Part of the fluid of a node, and of what would flow if pressure and height did not balance, that counts as flowing:
 where nothing flows any more the rest is rounding."""
@@ -295,16 +295,16 @@ class Fluid:
         sizes[first] += abs(asked.amount)
         if asked.pressure is not None:
             return None
-        came, room = float(plain[rows].sum()), max(float(volume[rows].sum()), 1e-300)
+        came, capacity = float(plain[rows].sum()), max(float(volume[rows].sum()), 1e-300)
         lacks = came - asked.amount
         if asked.amount > 0.0 and math.isfinite(asked.limit):
             over = y - (asked.limit + float(np.ptp(energy[rows]))) / self.p0
             # Compared by what it would store: a larger weight lets Newton's method jump over the limit and back.
-            at_limit = (over * room * self.p0 / self.bulk, over * room, None)
-            ways = [(lacks, lacks, asked.amount), at_limit, (came, came, 0.0)]
-            _, lacks, found = sorted(ways, key=lambda one: one[0])[1]
-        elif asked.amount < 0.0 and (y + 1.0) * room <= lacks:
-            lacks, found = (y + 1.0) * room, None
+            at_limit = (over * capacity * self.p0 / self.bulk, over * capacity, None)
+            candidates = [(lacks, lacks, asked.amount), at_limit, (came, came, 0.0)]
+            _, lacks, found = sorted(candidates, key=lambda one: one[0])[1]
+        elif asked.amount < 0.0 and (y + 1.0) * capacity <= lacks:
+            lacks, found = (y + 1.0) * capacity, None
         else:
             found = asked.amount
         residual[first] = lacks

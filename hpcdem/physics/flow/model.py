@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 GLANCE = 8
-"""Sub-steps after which it is seen whether one has come to half the stability limit before that: pieces that turn as
-they fly apart shorten their channels faster than a look comes."""
+"""Number of sub-steps between checks whether an estimated sub-step exceeds half the stability limit: pieces that rotate
+as they fly apart shorten their channels faster than the regular check notices."""
 SAFETY = 0.8
-"""Part of half the stability limit that an estimated sub-step may be when blocks move."""
+"""Fraction of half the stability limit up to which an estimated sub-step is accepted when blocks move."""
 FAR = 2.0
 """Times the stability limit: where a sub-step is longer any full node that nothing holds overshoots ever further."""
 
@@ -265,19 +265,19 @@ class Flow(Values):
         row = np.minimum(np.searchsorted(self.number, at), max(len(self.number) - 1, 0))
         mine = self.number[row] == at if len(self.number) else np.zeros(len(at), bool)
         row = row[mine]
-        room = np.zeros((3, len(at)))
-        room[:2, mine], room[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
-        room = self.blocks.comm.sum_into(room)
-        if not np.isfinite(room).all():
-            self._check(at[~np.isfinite(room).all(axis=0)])
+        collected = np.zeros((3, len(at)))
+        collected[:2, mine], collected[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
+        collected = self.blocks.comm.sum_into(collected)
+        if not np.isfinite(collected).all():
+            self._check(at[~np.isfinite(collected).all(axis=0)])
         after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
         value_at = partial(assigned.now, self.blocks.tables)
         ends = np.cumsum([len(one) for one in points])
         for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
             if end > begin:
-                after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, value_at)
+                after[begin:end] = well.filled(collected[:, begin:end], before, self.time, bulk, value_at)
             self.report_stage(well, before, self.time)
-        came = (after - room[0])[mine]
+        came = (after - collected[0])[mine]
         self.nodes[row, kernels.W] = after[mine]
         self.nodes[row, kernels.GIVEN] += came
         self.nodes[row, kernels.INFLOW] = came / (self.time - before)

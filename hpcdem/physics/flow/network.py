@@ -28,7 +28,7 @@ class Shape:
 EDGE = Shape(((0, 1),), (1, 0))
 TRIANGLE = Shape(((1, 2), (2, 0), (0, 1)), (0, 2, 1))
 SHAPES = {2: EDGE, 3: TRIANGLE}
-"""Shapes of channels by the number of their corners, which is that of the dimensions of space."""
+"""Shape of channels by the number of their corners, which equals the dimension of space."""
 LINKS = {corners: len(shape.links) for corners, shape in SHAPES.items()}
 """Number of links of a channel."""
 

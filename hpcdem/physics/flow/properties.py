@@ -11,12 +11,12 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.properties import JOINT, Model, Property
 
 FLUID = ("fluid_density", "fluid_bulk", "viscosity", "turbulence")
-"""Properties of the fluid: the same in all channels."""
+"""Properties of the fluid, the same in all channels."""
 MATRIX = ("matrix_permeability", "matrix_porosity_compressibility", "matrix_porosity")
-"""Properties needed for leak-off."""
+"""Properties that leak-off requires."""
 COMPRESSED = "matrix_porosity_compressibility"
 NEEDED = ("matrix_permeability", "matrix_porosity")
-"""Properties of leak-off that must not be zero: nothing would leak."""
+"""Properties of leak-off that must not be zero, since nothing would leak."""
 
 
 def _apertures(values: dict[str, Any]) -> None:

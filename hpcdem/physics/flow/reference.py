@@ -17,10 +17,10 @@ def out_of_triangle(at: np.ndarray, aperture: float, viscosity: float, head: np.
     normal = np.cross(at[1] - at[0], at[2] - at[0])
     area = 0.5 * np.linalg.norm(normal)
     normal /= 2.0 * area
-    ways = [np.cross(at[(k + 2) % 3] - at[(k + 1) % 3], normal) for k in range(3)]
-    gradient = -sum(p * way for p, way in zip(head, ways)) / (2.0 * area)
+    edges = [np.cross(at[(k + 2) % 3] - at[(k + 1) % 3], normal) for k in range(3)]
+    gradient = -sum(p * edge for p, edge in zip(head, edges)) / (2.0 * area)
     flux = -(aperture**3) / (12.0 * viscosity) * gradient
-    return np.array([0.5 * float(flux @ way) for way in ways])
+    return np.array([0.5 * float(flux @ edge) for edge in edges])
 
 
 def sub_step(

@@ -20,7 +20,7 @@ from hpcdem.physics.flow.tangent import Tangent
 AIM, ENOUGH = 1e-10, 1e-7
 """Residual of forces and fluid over their contributions: target, and limit if rounding allows no less."""
 MOST, HALVINGS = 25, 6
-"""Largest number of iterations of a step, and of halvings of an increment."""
+"""Largest number of iterations of a step, and of halvings of the increment of one iteration."""
 
 
 @dataclass

@@ -83,11 +83,11 @@ class Tangent:
     def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> list[Pieces]:
         """Make the derivatives of storage; nodes that follow the variable of another node are no unknowns."""
         p_u, s_u = self._rises(u, now)
-        room = np.maximum(now.volume, 1e-300)
-        diagonal = np.where(now.held, room, now.volume * (s_u + p_u / self.of.bulk))
+        volumes = np.maximum(now.volume, 1e-300)
+        diagonal = np.where(now.held, volumes, now.volume * (s_u + p_u / self.of.bulk))
         tied = np.flatnonzero(self.of.tied)
         made = []
-        for key, node, values in ((np.arange(self.of.n), self.of.first, diagonal), (tied, tied, room[tied])):
+        for key, node, values in ((np.arange(self.of.n), self.of.first, diagonal), (tied, tied, volumes[tied])):
             stiffness = np.zeros((len(key), self.of.dim, self.of.dim))
             stiffness[:, 0, 0] = values
             made.append(Pieces(key, first + node[:, None], stiffness))

@@ -40,7 +40,7 @@ CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "pack_pressure": ("Pa", "mean pressure of packs at its ends; NaN without proppant"),
 }
 _OF_OTHERS = ("temperature", "concentration", "proppant", "pack_pressure")
-"""Quantities stored by other physics."""
+"""Quantities that are stored by other physics."""
 QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
 """Quantities of flow nodes and channels that can be queried: unit and meaning."""
 

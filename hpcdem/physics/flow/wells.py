@@ -111,11 +111,11 @@ class Well:
         return Asked(None, dt * value(one.value, time) if one.does == RATE else 0.0, one.limit)
 
     def filled(
-        self, room: np.ndarray, before: float, after: float, bulk: float, value: Callable[[Number, float], float]
+        self, contents: np.ndarray, before: float, after: float, bulk: float, value: Callable[[Number, float], float]
     ) -> np.ndarray:
-        """Fluid of its nodes (n,) at the end of a sub-step; room (3, n): their fluid and room [m2] and potential energy
-        [Pa] before, without wells."""
-        had, volume, energy = room
+        """Return the fluid of its nodes (n,) at the end of a sub-step; contents (3, n): their fluid and volume [m2] and
+        potential energy [Pa] before, without wells."""
+        had, volume, energy = contents
         w, v, top = math.fsum(had.tolist()), math.fsum(volume.tolist()), float(energy.max())
         number = self.number(after)
         stage = self.stages[number - 1] if number else Stage(SHUT)
@@ -160,10 +160,10 @@ def _json(value: float) -> float | None:
 
 
 def _head(more: float, volume: np.ndarray, energy: np.ndarray, bulk: float) -> float:
-    """Head [Pa] with which nodes below it are so full that all of them hold this much [m2] more than their room: sum of
+    """Return the head [Pa] at which all nodes below it together hold this much [m2] more than their volume: sum of
     V (head - E) / K over nodes with E < head."""
     order = np.argsort(energy, kind="stable")
     v, e = volume[order], energy[order]
-    room, weight = np.cumsum(v), np.cumsum(v * e)
-    heads = (bulk * more + weight) / room
+    volumes, weight = np.cumsum(v), np.cumsum(v * e)
+    heads = (bulk * more + weight) / volumes
     return float(heads[np.flatnonzero(heads >= e)[-1]])

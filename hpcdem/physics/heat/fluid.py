@@ -45,11 +45,12 @@ class Rock(Protocol):
 
 
 SAFETY = 0.9
-"""Part of the stability limit that a sub-step may be."""
+"""Fraction of the stability limit up to which a sub-step is accepted."""
 SCANT = 1e-4
-"""Part of its room below which the fluid of a node does not limit sub-steps: it has the temperature of what passes."""
+"""Fraction of its volume below which the fluid of a node does not limit sub-steps: it takes the temperature of the
+fluid that passes."""
 LEAST = 1e-3
-"""Part of its length that a link leads along the flow at least."""
+"""Smallest length of a link along the flow, over its own length."""
 
 
 class FluidHeat(Assigned, Travelling):
@@ -149,7 +150,7 @@ class FluidHeat(Assigned, Travelling):
         corner = self.walls(channels)
         row = blocks.where[corner // 4]
         self._walls = np.ascontiguousarray(np.where(row >= 0, row * self.heat.t.shape[1] + corner % 4, -1))
-        self._sides, self._way, part_of_wall = self.shapes(channels)
+        self._sides, self._length_over_width, part_of_wall = self.shapes(channels)
         self._exchange = part_of_wall * np.repeat(self.transfers(channels), self.links)
         self._length = reduce(np.hypot, self._sides.T)
         self.wall_heat = np.zeros((len(self._ends), 4))
@@ -245,14 +246,14 @@ class FluidHeat(Assigned, Travelling):
         where it is at rest."""
         flow, n = self.flow, len(self.number)
         q, delta = flow.mean_flows(), np.repeat(flow.apertures(), self.links)
-        w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
+        w0, w, volume = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
         least = np.minimum(w0, w)
         self._period, self._passed, self._w0, self._leaked = period, 0.0, w0.copy(), flow.leaked()
-        wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
+        wet = np.minimum(np.divide(least, volume, out=np.zeros(n), where=volume > 0.0), 1.0)
         self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
         self._q, wet = self.crossing(q, self.state[:, kernels.S], self._ends, flow.held[self._ends])
-        self._conduct = self.constant("conductivity") * delta * wet / self._way
+        self._conduct = self.constant("conductivity") * delta * wet / self._length_over_width
         self._second = self.constant("second_order") > 0.0
         if self._second and self.links > 1:
             self._length = self.lengths(self._sides, self._q)

@@ -25,8 +25,8 @@ from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import Heat
 
 MOST, PLENTY, CHANGE = 100, 40, 1e-7
-"""Solutions of the linear system in a step with advection of second order: how many at most, from which on changes
-count half, and the change of temperatures, over their differences, at which one is the last but one."""
+"""Solutions of the linear system in a step with second-order advection: the largest number, the number from which on
+changes count half, and the change of temperatures, over their differences, after which only one more is made."""
 
 
 class Implicit:

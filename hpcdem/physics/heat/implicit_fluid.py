@@ -54,11 +54,11 @@ class Fluid:
         aperture = np.repeat(flow.values(CHANNEL, "aperture"), fluid.links)
         w, s, t = (flow.values(FLOW_NODE, name) for name in ("fluid", "saturation", "temperature"))
         q, wet = fluid.crossing(flow.link_flows(), s, ends, network.ends)
-        sides, way, part_of_wall = fluid.shapes(network.channels)
+        sides, ratio, part_of_wall = fluid.shapes(network.channels)
         transfers = np.repeat(fluid.transfers(network.channels), fluid.links)
         exchange = part_of_wall[:, None] * transfers[:, None] * part(s)[ends]
         return Fluid(
-            fluid, ends, fluid.lengths(sides, q), q, fluid.constant("conductivity") * aperture * wet / way, exchange,
+            fluid, ends, fluid.lengths(sides, q), q, fluid.constant("conductivity") * aperture * wet / ratio, exchange,
             heat.at.number[fluid.walls(network.channels)], fluid.held[network.nodes].astype(np.int64) - 1,
             fluid.rho_c * w, t,
         )  # fmt: skip

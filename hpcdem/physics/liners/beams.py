@@ -97,9 +97,9 @@ class Beams(Elements):
         liners, ends, goes_on = self.liners, laid.ends, laid.about
         x = np.concatenate([liners.nodes["x"], nodes["x"]])
         turn = np.concatenate([liners.nodes["turn"], nodes["turn"]])
-        way = x[ends[:, 1]] - x[ends[:, 0]]
-        length = np.hypot(way[:, 0], way[:, 1])
-        elements["length"][:], elements["angle"][:] = length, [math.atan2(y, x) for x, y in way.tolist()]
+        chord = x[ends[:, 1]] - x[ends[:, 0]]
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        elements["length"][:], elements["angle"][:] = length, [math.atan2(y, x) for x, y in chord.tolist()]
         elements["form"][:] = np.column_stack([length, turn[ends]])
         chain = int(liners.nodes["liner"].max(initial=-1)) + np.cumsum(~goes_on)
         arc = 0.0
@@ -126,8 +126,8 @@ class Beams(Elements):
         table[:, kernels.PLASTIC_MOMENT] = column("plastic_moment", math.inf)
         self.along, self._mean = np.zeros((len(length), 2)), np.zeros((len(liners), 2))
         for e, (a, b) in enumerate(beams["ends"].tolist()):
-            way = liners.nodes["x"][b] - liners.nodes["x"][a]
-            self.along[e] = way / math.sqrt(way[0] * way[0] + way[1] * way[1])
+            chord = liners.nodes["x"][b] - liners.nodes["x"][a]
+            self.along[e] = chord / math.sqrt(chord[0] * chord[0] + chord[1] * chord[1])
         mass = np.where(there, 0.5 * rho * area * length, 0.0)
         turning = 2.0 * ROTARY * mass * length**2 + np.where(there, 0.5 * rho * inertia * length, 0.0)
         shear = table[:, kernels.BENDING] / np.where(length > 0.0, length, 1.0) ** 2

@@ -34,7 +34,7 @@ class Elements(ABC):
     of_elements: ClassVar[Columns]
     quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]]
     parted_at: ClassVar[str]
-    """Part of the mesh between two joined elements."""
+    """Part of the mesh that two joined elements share."""
 
     def __init__(self, liners: Any) -> None:
         self.liners = liners  # physics.liners.model.Liners, which imports this
@@ -117,7 +117,7 @@ BOND: Mapping[str, tuple[str, str]] = {
     "bond_state": ("1", "state of a node: slipping 1, has slipped 2, bond broken 4, open 8"),
     "host": ("1", "element of its bond, -1: none"),
 }
-"""Quantities of elements of any kind: unit and meaning."""
+"""Quantities of elements of all kinds that can be queried: unit and meaning."""
 
 
 def of_bond(dim: int) -> Columns:

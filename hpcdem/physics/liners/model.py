@@ -206,10 +206,10 @@ class Liners(Structure):
         if self._dynamic:
             force = self._conditions_at(time, time)[:, kernels.FORCE + self.kind.parts]
             force = np.where(self._led(), force - self._total, force)
-            way = 0.5 * dt * np.column_stack([nodes["v"], nodes["spin"]])
+            path = 0.5 * dt * np.column_stack([nodes["v"], nodes["spin"]])
             weight = self._node_table[:, kernels.WEIGHT : kernels.WEIGHT + dim]
-            out[kernels.BY_CONDITIONS] = math.fsum((force * way).reshape(-1).tolist())
-            out[kernels.BY_GRAVITY] = math.fsum((weight * way[:, :dim]).reshape(-1).tolist())
+            out[kernels.BY_CONDITIONS] = math.fsum((force * path).reshape(-1).tolist())
+            out[kernels.BY_GRAVITY] = math.fsum((weight * path[:, :dim]).reshape(-1).tolist())
         return out
 
     def _stored(self) -> float:

@@ -140,7 +140,7 @@ class Shells(Elements):
     corners: ClassVar[int] = 3
     parts: ClassVar[np.ndarray] = np.arange(6)
     of_nodes: ClassVar[Columns] = {**of_node(3), "posture": (np.float64, 4)}
-    """posture: rotation since it was installed, as a unit quaternion."""
+    """posture: rotation since installation, as a unit quaternion."""
     of_elements: ClassVar[Columns] = {
         **of_bond(3), "rest": (np.float64, 3), "seat": (np.float64, 27), "form": (np.float64, 12),
         "force": (np.float64, 12), "plastic": (np.float64, 12),

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 COURANT = 0.1
-"""Part of its slurry that a node may lose in a sub-step, or a little more where the flow has just changed."""
+"""Fraction of its slurry that a node may lose in a sub-step, or slightly more where the flow has just changed."""
 STALE = 10.0
-"""Times, as long as a node needs to lose its slurry, that a step of flow may be without a word."""
+"""Longest step of flow without a warning, over the time in which a node loses its slurry."""
 SWEEPS = 4
 """Number of sweeps over the nodes for the factors of their inflow."""
 NO_STOKES = 1.0
-"""Reynolds number of a single grain beyond which Stokes' law is far off."""
+"""Reynolds number of a single grain above which Stokes' law is inaccurate."""
 
 
 class Proppant(ProppantAssignments):
@@ -54,7 +54,7 @@ class Proppant(ProppantAssignments):
         "room": ("nodes", kernels.ROOM), "volume": ("nodes", kernels.VOLUME), "given": ("given", -1),
         "packed": ("state", kernels.PACKED),
     }  # fmt: skip
-    """given: fluid that conditions had given."""
+    """given: fluid that conditions have supplied."""
     widths: ClassVar[Mapping[str, int]] = {"nodes": kernels.NODE, "given": 0, "state": kernels.STATE}
     nodes: np.ndarray
     given: np.ndarray
@@ -138,8 +138,8 @@ class Proppant(ProppantAssignments):
             return None
         full = self.values["proppant_concentration_limit"] / np.maximum(gathered(self.nodes[:, kernels.N]), 1e-300)
 
-        def pushed(room: np.ndarray) -> np.ndarray:
-            strain = 1.0 - full * room
+        def pushed(volume: np.ndarray) -> np.ndarray:
+            strain = 1.0 - full * volume
             return modulus * np.stack([np.maximum(strain, 0.0), np.where(strain > 0.0, -full, 0.0)])
 
         return pushed
@@ -209,8 +209,8 @@ class Proppant(ProppantAssignments):
 
     def update_slurry(self) -> None:
         """Set the slurry of the nodes to its present volume after commands. Not collective."""
-        room = self._slurry_volumes()
-        self.nodes[:, kernels.ROOM_BEFORE] = room
+        now = self._slurry_volumes()
+        self.nodes[:, kernels.ROOM_BEFORE] = now
         self.given = self.flow.nodes[:, flowing.GIVEN].copy()
         self.time = self.flow.time
 
@@ -218,8 +218,8 @@ class Proppant(ProppantAssignments):
         """Update the volume of each node and its space for slurry, and return the latter."""
         volume = self.flow.nodes[:, flowing.V]
         self.nodes[:, kernels.VOLUME] = volume
-        self.nodes[:, kernels.ROOM] = room = np.minimum(self.flow.nodes[:, flowing.W], volume)
-        return room
+        self.nodes[:, kernels.ROOM] = now = np.minimum(self.flow.nodes[:, flowing.W], volume)
+        return now
 
     def filled(self) -> None:
         """A command has given fluid to nodes, or taken it; their proppant stays."""
@@ -347,8 +347,8 @@ class Proppant(ProppantAssignments):
         self.given = flow.nodes[:, flowing.GIVEN].copy()
         kinds = np.array([kind == RATE for kind, _ in self.conditions])[self._prescribed]
         value = np.array([assigned.now(tables, value, flow.time) for _, value in self.conditions])[self._prescribed]
-        room = np.maximum(self.nodes[:, kernels.ROOM_BEFORE], 1e-300)
-        leaves = np.minimum(came, 0.0) / room
+        slurry = np.maximum(self.nodes[:, kernels.ROOM_BEFORE], 1e-300)
+        leaves = np.minimum(came, 0.0) / slurry
         self.nodes[:, kernels.SOURCE] = np.where(
             kinds, value * (dt / count), np.where(came > 0.0, value * came, leaves) / count
         )

@@ -10,13 +10,13 @@ import numpy as np
 
 def sub_step(
     ends: np.ndarray, q: np.ndarray, delta: np.ndarray, along: np.ndarray, held: np.ndarray, n: np.ndarray,
-    room: np.ndarray, packed: np.ndarray, wet: np.ndarray, limit: float, dt: float, sweeps: int,
+    slurry: np.ndarray, packed: np.ndarray, wet: np.ndarray, limit: float, dt: float, sweeps: int,
 ) -> np.ndarray:  # fmt: skip
     """Proppant n (nodes,) [m2] after a sub-step dt [s]. ends (m, 2): nodes of channels; q (m,) [m2/s]: slurry that
     flows from the first to the last; delta (m,) [m]; along (m,) [m/s]: speed of a single grain in that direction; held
-    (m,) bool: grains do not pass; room (nodes,) [m2]: slurry of nodes, packed (nodes,) bool, wet (nodes,): saturation;
-    limit: concentration of a pack; sweeps: over the nodes, for what they take."""
-    c = np.divide(n, room, out=np.zeros_like(n), where=room > 0.0)
+    (m,) bool: grains do not pass; slurry (nodes,) [m2]: of nodes, packed (nodes,) bool, wet (nodes,): saturation;
+    limit: concentration of a pack; sweeps: number of sweeps over the nodes for the factors of their inflow."""
+    c = np.divide(n, slurry, out=np.zeros_like(n), where=slurry > 0.0)
     moves = []  # from, to, volume
     for (a, b), flow, width, v, shut in zip(ends.tolist(), q, delta, along, held):
         if shut:
@@ -35,7 +35,7 @@ def sub_step(
         for a, b, volume in moves:
             comes[b] += gives[a] * volume
             goes[a] += gives[a] * volume * takes[b]
-        free = np.maximum(limit * room - n + goes, 0.0)
+        free = np.maximum(limit * slurry - n + goes, 0.0)
         takes = np.array([min(free[i] / comes[i], 1.0) if comes[i] > 0.0 else 1.0 for i in range(len(n))])
     after = n.copy()
     for a, b, volume in moves:

@@ -11,7 +11,7 @@ import math
 from functools import lru_cache
 
 NEWTON = 1000.0
-"""Reynolds number beyond which the drag coefficient is 0.44."""
+"""Reynolds number above which the drag coefficient is 0.44."""
 
 
 def drag(reynolds: float) -> float:

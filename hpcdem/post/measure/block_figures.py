@@ -20,11 +20,11 @@ GREY, PALE = "#808080", "#e4e1d8"
 MAP_HEIGHT = 9.5
 """Largest height of maps [cm]."""
 LOWER_GAP = 1.45
-"""Above panels that have another axis than those over them [cm]."""
+"""Gap above panels whose axis differs from that of the panels above them [cm]."""
 LEGEND = 0.6
-"""Room for a line of a legend over the maps [cm]."""
+"""Height of a line of a legend above the maps [cm]."""
 SOME_FRAMES = 5
-"""Size distributions that are drawn at most."""
+"""Largest number of size distributions in a figure."""
 FRAGMENT_COLOURS = (
     "#7fa6c9", "#e8b27d", "#9cc49a", "#c9a0c4", "#d8cf7f", "#8fc4c0", "#dd9a96", "#b3b7d9", "#c4a98a", "#a8c97f",
 )  # fmt: skip
@@ -429,7 +429,7 @@ def _fluid_bar(figure: Any, drawn: Any, axes: Any, title: str) -> None:
 
 
 FLAT = 0.05
-"""Part of its extent by which a fracture may leave its mean plane to be drawn in it."""
+"""Largest deviation of a fracture from its mean plane, over its extent, with which it is drawn in that plane."""
 
 
 def _fluid_in_space(parts: Sequence[Part], state: MeshState) -> Any:

@@ -38,7 +38,7 @@ SHARES = 0.2, 0.5, 0.8
 """Fractions of the area for which the passing size is reported."""
 HEAD = ("step", "time[s]")
 MEASURES = {2: ("length", "area"), 3: ("joint_area", "volume")}
-"""Columns of frames: of the size of joints and of elements, by dimensions of space."""
+"""Columns of frames with the sizes of joints and of elements, by dimension of space."""
 
 
 @dataclass(frozen=True)
@@ -338,7 +338,7 @@ def _each_crack(state: MeshState, wanted: np.ndarray) -> Sheet:
 
 
 OF_CRACKS = {"mode": "mode", "aperture[m]": "aperture", "time[s]": "break_time"}
-"""Columns of broken joints, and in frames; apertures are there with fluid."""
+"""Columns of broken joints, and their names in frames; apertures exist where there is fluid."""
 
 
 SIZES = {2: ("length[m]", "p21"), 3: ("area[m2]", "p32")}
@@ -406,7 +406,7 @@ OF_CHANNELS = {
     "flow_rate[m2/s]": "flow_rate", "velocity[m/s]": "fluid_velocity", "temperature[K]": "fluid_temperature",
     "concentration": "proppant_concentration", "pack_pressure[Pa]": "pack_pressure",
 }  # fmt: skip
-"""Columns of channels, and in frames; the last ones are there with further physics."""
+"""Columns of channels, and their names in frames; the last ones exist where there is further physics."""
 
 
 def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:

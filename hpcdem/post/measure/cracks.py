@@ -19,7 +19,7 @@ from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.images import inside
 
 LEVELS = 0.1, 0.5
-"""Damage from which particles are counted."""
+"""Damage from which on particles are counted."""
 _LOG = re.compile(r"step (\d+) \|.*\((\d+) broken in tension, (\d+) in shear\)")
 
 

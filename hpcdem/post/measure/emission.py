@@ -30,7 +30,7 @@ TABLE = "cracks.csv"
 BIN = 0.1
 """Width of the bins of magnitude."""
 FEWEST = 10
-"""Events from Mc on without which no b-value is given."""
+"""Smallest number of events at or above Mc for which a b-value is given."""
 MODES = ("tension", "mixed", "shear")
 LIMITS = 4.0 / 3.0, 5.0 / 3.0
 """Modes (1 opened, 2 slid) from which a joint counts as mixed and as shear."""

@@ -25,17 +25,17 @@ SHARE, COVERED = 0.25, 0.5
 """A band belongs to a fault if they share this part of the particles of the smaller one; a fault without a band of its
 own that shares COVERED of its particles with the band of another one has merged into that."""
 TURN = 30.0
-"""A band that dips by more than this many degrees otherwise than the last one is another fault."""
+"""Difference of dip [degrees] above which a band belongs to another fault than the last one."""
 RECENT = 3
-"""Active frames whose particles define where a fault is."""
+"""Number of active frames whose particles define where a fault is."""
 LEAST = 2
-"""A fault has bands in as many frames at least, where there are as many."""
+"""Smallest number of frames in which a fault has bands, where there are as many frames."""
 ALONG, BESIDE = 2.5, 4.0
 """Window on each side of a point of the line, in cells: half its length, and its width from the edge of the band on."""
 FEWEST = 6
-"""Particles that a fit needs."""
+"""Smallest number of particles of a fit."""
 STEEP = 80.0
-"""Steeper lines [degrees] have no hanging wall."""
+"""Dip [degrees] above which a fault has no hanging wall."""
 STRAIGHT = 1.0
 """Largest standard deviation of the points of a horizon about their line, in cells."""
 

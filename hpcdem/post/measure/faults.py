@@ -67,7 +67,7 @@ def bands(
 
 
 STRONG = 3.0
-"""Number of thresholds beyond which more strain does not make a band more likely."""
+"""Multiple of the threshold above which more strain does not make a band more likely."""
 _ANGLES = np.radians(np.arange(0.0, 180.0, 3.0))
 _NARROW, _WIDEST, _GAP = 1.5, 6.0, 2.5  # cells: half widths of a band, and the largest gap along it
 

@@ -25,7 +25,7 @@ from hpcdem.post.saved import write
 LEFT, RIGHT, TOP, BOTTOM, GAP = 1.75, 0.45, 0.55, 1.1, 0.45
 """Margins of a page and space between panels with a common x axis [cm]."""
 PALE = 0.45
-"""Share of its colour that a particle keeps under lines."""
+"""Fraction of its colour that a particle keeps under lines."""
 RIGHTWARD, LEFTWARD, INK = "#b2182b", "#2166ac", "#202020"
 LINES = ("#1b6ca8", "#c8511b", "#3a8a4d", "#7a4fa3", "#8a6d1f", "#c2378a", "#4d4d4d", "#16a0a0")
 MOST_PROFILES = 14

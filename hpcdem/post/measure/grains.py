@@ -184,23 +184,23 @@ def driving_wall(first: Walls, last: Walls) -> int | None:
     """Id of the wall whose middle went farthest along x, None where none went. Walls that bend (FLEXURE) become
     shorter: they do not push."""
     rigid = [i for i in first if i in last and math.isclose(math.dist(*first[i]), math.dist(*last[i]), rel_tol=1e-6)]
-    ways = {i: gone(first, last, i) for i in rigid if i not in sides_of_box(first)}
-    wall = max(ways, key=lambda i: ways[i], default=None)
-    return wall if wall is not None and ways[wall] > 0.0 else None
+    paths = {i: gone(first, last, i) for i in rigid if i not in sides_of_box(first)}
+    wall = max(paths, key=lambda i: paths[i], default=None)
+    return wall if wall is not None and paths[wall] > 0.0 else None
 
 
 def pushing_row(first: Grains, last: Grains) -> np.ndarray:
     """Ids of the row of particles that pushes: of those fixed along x and y in both frames, which went equally far
     along x and stand higher than wide, those that went farthest; none: no such row moves."""
     a, b = common(first.take(first.fixed), last.take(last.fixed))
-    way = b.x - a.x
-    far = float(np.abs(way).max(initial=0.0))
+    moved = b.x - a.x
+    far = float(np.abs(moved).max(initial=0.0))
     best = np.zeros(0, np.int64)
     if far > 0.0:
-        order = np.argsort(way, kind="stable")
-        rows = np.split(order, np.flatnonzero(np.diff(way[order]) > 1e-3 * far) + 1)
-        upright = [row for row in rows if np.ptp(b.y[row]) > np.ptp(b.x[row]) and abs(way[row]).min() > 1e-3 * far]
-        best = b.gid[max(upright, key=lambda row: float(np.abs(way[row]).min()), default=best)]
+        order = np.argsort(moved, kind="stable")
+        rows = np.split(order, np.flatnonzero(np.diff(moved[order]) > 1e-3 * far) + 1)
+        upright = [row for row in rows if np.ptp(b.y[row]) > np.ptp(b.x[row]) and abs(moved[row]).min() > 1e-3 * far]
+        best = b.gid[max(upright, key=lambda row: float(np.abs(moved[row]).min()), default=best)]
     return best
 
 

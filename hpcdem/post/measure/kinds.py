@@ -21,11 +21,11 @@ Done = list[tuple[Stamp, Any]]
 """The parts of all frames, in the order of time; None for a frame of which there is nothing to say."""
 NAN = float("nan")
 TOTAL, STEP = 0.5, 0.2
-"""Thresholds of strain for faults: of that since the first section, and of that from frame to frame."""
+"""Thresholds of strain for faults: of the strain since the first section, and of the strain from frame to frame."""
 TIMES_MEAN, LEAST_STEP = 3.0, 0.005
-"""Threshold for faults over time: this many means of |strain| of the frame, and this strain at least."""
+"""Threshold for faults over time: this multiple of the mean |strain| of the frame, and at least this strain."""
 SHORTEST, SKIN = 6.0, 2.0
-"""Shortest band, and how near to the base and to the wall strain is that of these, in cells."""
+"""Shortest band, and the distance from the base and the wall within which strain is attributed to these, in cells."""
 
 
 @dataclass(frozen=True)

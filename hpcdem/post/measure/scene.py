@@ -175,8 +175,8 @@ def _pusher(request: Request, frames: list[FrameFile]) -> tuple[int | None, np.n
             if not begin.fixed.any():
                 continue
             row = pushing_row(begin, end)
-            way = abs(face_of_row(end, row, 1) - face_of_row(begin, row, 1)) if len(row) else 0.0
-            if way > 0.0 and (moving is None or way > gone(first, last, moving)):
+            path_length = abs(face_of_row(end, row, 1) - face_of_row(begin, row, 1)) if len(row) else 0.0
+            if path_length > 0.0 and (moving is None or path_length > gone(first, last, moving)):
                 return None, row, frames[k:]
             break
     return moving, none, frames

@@ -82,6 +82,6 @@ def read_walls(path: str | os.PathLike, first: int | None = None, last: int | No
 
 def driver(curves: dict[int, Curve]) -> int | None:
     """Return the wall with the longest path, None if none moved."""
-    ways = {wall: float(curve.path_length[-1]) for wall, curve in curves.items() if wall not in sides_of_box(curves)}
-    best = max(ways, key=lambda w: ways[w], default=None)
-    return best if best is not None and ways[best] > 0.0 else None
+    paths = {wall: float(curve.path_length[-1]) for wall, curve in curves.items() if wall not in sides_of_box(curves)}
+    best = max(paths, key=lambda w: paths[w], default=None)
+    return best if best is not None and paths[best] > 0.0 else None

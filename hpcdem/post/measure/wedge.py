@@ -20,8 +20,8 @@ ROUGH = 3.0
 the standard deviation of the surface in front. The highest and the farthest point of a rough level surface lie
 anywhere, but part nothing."""
 LEAST_FRONT = 5
-"""Surface points from the toe on; where there are fewer, the fall from crest to toe is compared with the roughness
-there."""
+"""Smallest number of surface points from the toe on; where there are fewer, the fall from crest to toe is compared with
+the roughness there."""
 
 
 @dataclass(frozen=True)

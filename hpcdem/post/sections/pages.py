@@ -19,7 +19,7 @@ from hpcdem.post.sections.panels import Kind
 
 CM, CM_OF_POINT = 1.0 / 2.54, 2.54 / 72.0
 HEIGHT, SHEET = 1.8, 24.0
-"""A page is at most this many times as high as wide, or as high as a sheet of paper; more panels go side by side, or
+"""Largest height of a page over its width, and the height of a sheet of paper [cm]; further panels go side by side, or
 on the next page."""
 RIGHT, TOP, GAP, BOTTOM, BAR, BAR_HEIGHT = 0.35, 0.3, 0.5, 1.1, 0.92, 0.28
 LEFT, DIGIT = 0.95, 0.17

@@ -32,7 +32,8 @@ FIELD_PIXELS = 1000
 """Approximate number of pixels of a field across a panel; at most FINEST per cell."""
 FINEST = 8
 BALL = 3.0
-"""Material is where a ball of this many median radii cannot get to between the particles, as under the surface line."""
+"""Radius in median radii of a ball: where it does not fit between the particles there is material, as under the surface
+line."""
 VECTOR_DISCS, DISC_PIXELS = 30000, 2400
 """Number of particles above which they become a bitmap in a vector picture; width of the bitmap in pixels."""
 

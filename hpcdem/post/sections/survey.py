@@ -15,7 +15,7 @@ from hpcdem.post.section import Section
 
 KM = 1000.0
 AIR = 0.02
-"""Free room over the particles, part of the width of the view."""
+"""Free height above the particles over the width of the view."""
 
 
 @dataclass(frozen=True)

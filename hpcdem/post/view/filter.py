@@ -21,14 +21,14 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 
 LONGEST = 400
-"""Characters of an expression."""
+"""Largest number of characters of an expression."""
 DEEPEST = 40
-"""Parentheses, functions and operators within each other."""
+"""Largest depth to which parentheses, functions and operators are nested."""
 FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
     "abs": (1, np.abs), "sqrt": (1, np.sqrt), "log10": (1, np.log10), "hypot": (2, np.hypot),
     "min": (2, np.minimum), "max": (2, np.maximum), "isnan": (1, np.isnan),
 }  # fmt: skip
-"""How many values each takes, and what it is."""
+"""Number of arguments of each function, and the function."""
 GROUP = "group"
 """`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may be quoted."""
 _GIVEN = re.compile(r"\s*[A-Za-z_]\w*\s*=(?!=)")

@@ -23,7 +23,7 @@ from hpcdem.post.view.filter import LONGEST
 
 VERSION = 1
 MOST_LAYERS = 60
-"""Pictures tell layers apart by a byte, and people by far fewer."""
+"""Largest number of layers: pictures distinguish them by a byte, and readers far fewer."""
 _Colour = Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")]
 _Span = tuple[FiniteFloat, FiniteFloat]
 
@@ -133,7 +133,7 @@ def view_of(given: Mapping[str, Any], source: str) -> ModelView:
 
 
 _FORMS = {"limits": "two numbers", "camera": "left, right, bottom, top"}
-"""What lists of numbers are."""
+"""Descriptions of lists of numbers in messages."""
 
 
 def _wrong(errors: Sequence[Mapping[str, Any]], given: Mapping[str, Any]) -> str:

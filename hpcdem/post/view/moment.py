@@ -22,9 +22,9 @@ from hpcdem.post.view import tracks
 
 DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
 SOLIDS, FACES, RODS = "solids", "faces", "rods"
-"""In space."""
+"""Names of the shapes in space."""
 SPOTS, BALLS = "spots", "balls"
-"""Points, in the plane and in space."""
+"""Names of the shapes of points, in the plane and in space."""
 INSIDE = ("clumps", "contacts", "bonds", "joints", "channels", "face-conditions", "flow-nodes", "node-conditions",
           "faults")  # fmt: skip
 """Objects that lie between others."""
@@ -32,7 +32,7 @@ OF_CHANNELS = (
     "aperture", "fluid_pressure", "saturation", "flow_rate", "fluid_velocity", "fluid_temperature",
     "proppant_concentration", "pack_pressure",
 )  # fmt: skip
-"""Columns of joints that channels have."""
+"""Columns of joints that exist where there are channels."""
 UNITS = {
     "Pa": ("stress", "pressure", "suction", "ebmod", "gbmod", "tstrength", "sstrength"),
     "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
@@ -48,21 +48,21 @@ UNITS = {
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
 OF_LENGTHS = ("flow_rate", "membrane", "transverse", "bending")
-"""Beginnings of fields that are of a metre in space too: of a channel, of a shell."""
+"""Beginnings of the names of fields that are per metre in space too: of a channel, of a shell."""
 
 KEPT = 40e6
-"""Bytes of columns of a kind of object that are kept: those of the colours on show, and a few more."""
+"""Memory [B] of the columns of one kind of object that are kept: those of the colours on show, and a few more."""
 CHUNK = 1 << 16
 """Rows processed at a time."""
 PARTS = {
     "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest",
     "smallest", "first", "last", "shear",
 }  # fmt: skip
-"""Ends of the names of fields that change no unit."""
+"""Ends of the names of fields that do not change the unit."""
 
 
 _Reader = Callable[[slice], np.ndarray]
-"""Values of some rows."""
+"""Function that returns the values of some rows."""
 
 
 def unit_of(name: str, dim: int = 2) -> str:
@@ -246,7 +246,7 @@ def read_moment(path: str | os.PathLike) -> Moment:
 
 
 def _with_faults(moment: Moment, path: Path) -> Moment:
-    """With the faults that were measured in this frame."""
+    """Return the moment with the faults that were measured in this frame."""
     ends, fields = tracks.faults(path, moment.step) if moment.dim == 2 else (np.zeros((0, 2, 2)), {})
     if len(ends):
         names = {"fault": [f"fault {k}" for k in range(int(fields["fault"].max()) + 1)]}
@@ -397,7 +397,8 @@ def _clumps(
 
 
 STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress", "stress_deviator")
-"""Of particles, from the forces on them, compression positive: components, mean (s1 + s2) / 2, (s1 - s2) / 2."""
+"""Stresses of particles, from the forces on them, compression positive: components, mean (s1 + s2) / 2, (s1 - s2) /
+2."""
 
 
 def _unread(columns: Any) -> Any:
@@ -562,7 +563,7 @@ def _further(state: MeshState, name: str, table: Mapping[str, np.ndarray]) -> Ob
 
 
 VECTORS = ("displacement", "velocity")
-"""Of corners."""
+"""Vectors of corners."""
 
 
 def _supports(name: str, tables: Mapping[str, Mapping[str, np.ndarray]]) -> Objects:

@@ -28,16 +28,16 @@ EDGE = "#5a5a5a"
 FINE = 2
 """Square root of the number of samples of which each pixel of bodies in three dimensions is the mean."""
 EDGES = 0.5
-"""Width of their edges [points]."""
+"""Width of the edges of bodies [points]."""
 LARGEST = 8192
-"""Pixels of them along a side at most."""
+"""Largest number of pixels of bodies along a side."""
 MOST = 2**24
-"""Pixels of them in all: a gigabyte while they are painted."""
+"""Largest number of pixels of bodies: a gigabyte while they are painted."""
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BAR = 1.35, 0.35, 1.05, 0.75, 1.9  # cm around the model, and for each bar of colours
 SWATCH = 0.8
-"""Width of one of several colours of a class, over the size of letters."""
+"""Width of a colour of a class that has several, over the size of letters."""
 _CORNER = 2.0
-"""Side of the square with the axes of space [cm]."""
+"""Side of the square in which the axes of space are drawn [cm]."""
 
 
 @dataclass(frozen=True)

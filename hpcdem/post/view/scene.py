@@ -21,30 +21,30 @@ from hpcdem.post.view.model import Layer, ModelView
 from hpcdem.post.view.moment import BALLS, DISCS, LINES, RODS, SOLIDS, SPOTS, Moment, Objects, lengths
 
 STEPS = 256
-"""Colours of a field."""
+"""Number of colours of a field."""
 NOTHING = "#b8b8b8"
-"""Of objects without a value."""
+"""Colour of objects without a value."""
 INK = {
     "contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": "#7a5195", "channels": "#2f7fb5",
     "face-conditions": "#e07b00", "flow-nodes": "#17607f", "node-conditions": "#a3195b",
     "faults": "#c81e1e",
 }  # fmt: skip
-"""Of lines and points without a field."""
+"""Colours of lines and points without a field."""
 WIDTH = {
     "walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2,
     "face-conditions": 2.6, "flow-nodes": 3.0, "node-conditions": 4.0, "faults": 2.4,
 }  # fmt: skip
-"""Of lines, and of points as discs [points], at size 1."""
+"""Width of lines, and diameter of points drawn as discs [points], at size 1."""
 POINT = 1.0 / 480.0
-"""Of rods and points: a point, over the width of the picture."""
+"""A point of rods and points, over the width of the picture."""
 THROUGH = 0.35
 """Opacity of elements around rods."""
 MOST_ARROWS = 3000
-"""Of a picture: with more objects only every k-th is shown."""
+"""Largest number of arrows in a picture: with more objects only every k-th has one."""
 LONGEST = 0.2
-"""Length of the arrow that tells how long a value is, over the width of the picture, at most."""
+"""Largest length, over the width of the picture, of the arrow that shows the scale."""
 ARROW = 0.05
-"""Length of the longest, over the width of the picture."""
+"""Length of the longest arrow, over the width of the picture."""
 CATEGORIES = (
     "#4477aa",
     "#ee6677",
@@ -57,7 +57,7 @@ CATEGORIES = (
     "#994f00",
     "#44aa99",
 )
-"""Of groups: ten that colour-blind readers distinguish (Tol 2021, with three more)."""
+"""Colours of groups: ten that colour-blind readers distinguish (Tol 2021, with three more)."""
 PALE = ("#77aadd", "#eedd88", "#ee8866", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff", "#aaaa00")
 """Colours of groups of elements, on which joints and bolts are visible (Tol 2021, light)."""
 TRACES = (
@@ -154,7 +154,7 @@ class Scene:
 
 
 STILL = 1e-9
-"""Over the size of a model: what has not moved farther has not moved."""
+"""Displacement over the size of a model below which an object counts as unmoved."""
 
 
 def default_view(moment: Moment) -> ModelView:
@@ -463,7 +463,8 @@ def _largest(values: np.ndarray) -> float:
 
 
 FEW = 0.01
-"""Part of the values that may lie beyond each end of a bar: a single element shall not take all colours."""
+"""Fraction of the values that may lie beyond each end of a colour bar, so that a single element does not take all
+colours."""
 
 
 def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
@@ -538,7 +539,7 @@ def _by_name(
 
 
 MIXED = 0.02
-"""Part of the discs of a group that a colour of its legend has at least."""
+"""Fraction of the discs of a group from which on a colour is named in its legend."""
 
 
 def _beds(objects: Objects, rows: np.ndarray, kind: np.ndarray) -> list[tuple[str, str]]:

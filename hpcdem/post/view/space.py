@@ -34,11 +34,11 @@ def turn_of(eye: tuple[float, float, float]) -> np.ndarray:
 def axes_of(turn: np.ndarray) -> tuple[tuple[float, str], tuple[float, str]] | None:
     """Sign and name of the axes along the picture and up it, where both are axes of space; else None."""
     found = []
-    for way in turn[:2]:
-        k = int(np.argmax(np.abs(way)))
-        if abs(way[k]) < 1.0 - 1e-12:
+    for direction in turn[:2]:
+        k = int(np.argmax(np.abs(direction)))
+        if abs(direction[k]) < 1.0 - 1e-12:
             return None
-        found.append((float(np.sign(way[k])), "xyz"[k]))
+        found.append((float(np.sign(direction[k])), "xyz"[k]))
     return found[0], found[1]
 
 
@@ -88,8 +88,8 @@ def _bare(points: np.ndarray, cells: np.ndarray, of: np.ndarray, cut: np.ndarray
 
 def rods(ends: np.ndarray, radius: float, plane: tuple[np.ndarray, np.ndarray] | None = None) -> Skin:
     """Bars (n, 2, 3) [m] as prisms of `SIDES` sides, without ends, less what the plane takes away."""
-    way = ends[:, 1] - ends[:, 0]
-    along = way / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+    difference = ends[:, 1] - ends[:, 0]
+    along = difference / np.maximum(np.linalg.norm(difference, axis=1), 1e-300)[:, None]
     least = np.eye(3)[np.argmin(np.abs(along), axis=1)]
     across = np.cross(along, least)
     across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]

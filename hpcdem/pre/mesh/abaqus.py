@@ -26,7 +26,7 @@ REFUSED = {
     "SYSTEM": "gives points in a local coordinate system", "SYMMETRICMODELGENERATION": "makes a part of the model",
     "IMPORT": "reads the mesh from a result",
 }  # fmt: skip
-"""Without what these do the mesh would be another one."""
+"""Keywords without which the mesh would be a different one, and the reason for the message."""
 PLANE = re.compile(r"(?:CPE|CPS|CPEG|CAX|CGAX|DC2D|DCC2D|DCAX|DCCAX|AC2D|ACAX|STRI|S|DS|M3D|R3D|SFM3D)(\d+)[A-Z]*5?$")
 SOLID = re.compile(r"(?:C3D|DC3D|DCC3D|AC3D)(\d+)[A-Z]*$")
 KINDS = {
@@ -34,7 +34,7 @@ KINDS = {
     3: {4: "tetra", 8: "hexahedron", 10: "tetra", 20: "hexahedron", 27: "hexahedron", 6: "wedge", 15: "wedge",
         5: "pyramid", 13: "pyramid", 18: "wedge"},
 }  # fmt: skip
-"""Kind by dimension and number of points."""
+"""Kind of element by dimension and number of points."""
 SIDES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -43,9 +43,9 @@ SIDES = {
 }
 """Corners of S1, S2, ... of each kind."""
 LARGEST = 2**63
-"""Numbers of nodes and elements are smaller."""
+"""Bound of the numbers of nodes and elements, which are smaller."""
 DEEPEST = 20
-"""Files that include files."""
+"""Largest depth to which files include files."""
 NODES, ELEMENTS, FACES = "NSET", "ELSET", "SURFACE"
 
 

@@ -25,11 +25,11 @@ from hpcdem.pre.mesh.solids import Brep, Shell
 MOST_TRIANGLES = 20_000
 """Largest number of triangles of a shell: each becomes a surface of OpenCASCADE."""
 MOST_TEXT = 50_000_000
-"""Characters of a solid: checkpoints hold them."""
+"""Largest number of characters of a solid, since checkpoints hold them."""
 SAME = 1e-7
-"""Corners nearer than this part of the size are one."""
+"""Distance over the size of the solid below which corners are one."""
 TURN = 24
-"""Edges of the picture in a full turn."""
+"""Number of edges of the picture in a full circle."""
 KINDS = (".step", ".stp", ".brep", ".stl", ".dxf")
 
 

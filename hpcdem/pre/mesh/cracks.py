@@ -20,7 +20,7 @@ from hpcdem.pre.mesh.geometry import Curve, arc_of, distance_to_segment
 from hpcdem.pre.mesh.solids import Disc, on_surface
 
 TOLERANCE = 1e-6
-"""An edge lies on a line if it keeps to it within this part of its own length."""
+"""Largest distance of an edge from a line on which it lies, over its own length."""
 STRAYING = 4.0
 """Factor by which the cost of a path along edges grows with the square of its distance from the trace, in edge
 lengths."""
@@ -156,7 +156,7 @@ def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
 
 
 class _Paths:
-    """Ways along the edges of a mesh."""
+    """Paths along the edges of a mesh."""
 
     def __init__(self, mesh: Mesh, edges: Edges) -> None:
         self.points = mesh.points

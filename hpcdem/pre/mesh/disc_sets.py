@@ -20,7 +20,7 @@ from hpcdem.pre.mesh.fracture_sets import Length
 from hpcdem.pre.mesh.solids import _frame
 
 GRID = 400
-"""Steps of the mean over directions, each way."""
+"""Number of steps of the mean over directions, along each of the two angles."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from hpcdem.pre.mesh.geometry import Curve
 NOTES = frozenset(
     "TEXT MTEXT DIMENSION ARC_DIMENSION LEADER MULTILEADER TOLERANCE ATTDEF ATTRIB HATCH VIEWPORT IMAGE WIPEOUT".split()
 )
-"""Entities with notes of a drawing; omitted without a warning."""
+"""Entities that annotate a drawing; they are omitted without a warning."""
 UNITS = {
     1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 1e-3),
     5: ("centimetres", 1e-2), 6: ("metres", 1.0), 7: ("kilometres", 1e3), 8: ("microinches", 2.54e-8),
@@ -27,7 +27,7 @@ UNITS = {
 }  # fmt: skip
 """Name and metres of the codes of $INSUNITS."""
 FLATTENING = 1e-4
-"""Splines and ellipses become polylines that deviate by this part of their size at most."""
+"""Largest deviation of the polylines that replace splines and ellipses, over their size."""
 
 
 def opened(path: Path) -> Any:

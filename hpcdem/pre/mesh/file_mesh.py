@@ -17,7 +17,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError
 
 CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
-"""Corners of the elements that are read; others can only be refused or left out."""
+"""Number of corners of the elements that are read; others can only be refused or omitted."""
 DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3}
 IN_WORDS = {
     "vertex": "points", "line": "lines", "triangle": "triangles", "quad": "quads", "tetra": "tetrahedra",

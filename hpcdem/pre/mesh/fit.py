@@ -12,13 +12,13 @@ from hpcdem.physics.fdem.connectivity import bodies
 from hpcdem.physics.fdem.mesh import Mesh
 
 TOLERANCE = 1e-3
-"""Points are one if they are nearer than this part of the shortest edge on a surface."""
+"""Fraction of the shortest edge on a surface: points that are nearer to each other are one."""
 OPPOSITE = 0.999
 """Faces that lie on each other look away from each other: the cosine of their normals is below minus this."""
 LEVEL = 0.5
-"""Least cosine between the normals of two triangles that form a quad."""
+"""Smallest cosine between the normals of two triangles that form a quad."""
 PLACES = 3
-"""Places that a message names."""
+"""Number of positions that a message names."""
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from hpcdem.pre.mesh.fractures import DRAWS, MOST, poisson
 from hpcdem.pre.mesh.solids import Disc, _frame
 
 SPOTS = 512
-"""Points of a disc by which its area inside of the bodies is measured (`reached`)."""
+"""Number of points of a disc with which its area inside the bodies is measured (`reached`)."""
 VOLUME = 2_000_000
-"""Points by which the volume of the bodies is measured (`reached`)."""
+"""Number of points with which the volume of the bodies is measured (`reached`)."""
 
 
 def discs(one: DiscSet, bodies: Sequence[Any], seed: int, number: int = 0) -> list[Disc]:

@@ -24,9 +24,9 @@ from hpcdem.pre.mesh.fracture_sets import FractureSet
 from hpcdem.pre.mesh.geometry import Curve, sampled
 
 MOST = 1_000_000
-"""Traces of one set at most; more is a slip of units."""
+"""Largest number of traces of one set; more are a mistake of units."""
 DRAWS = 8
-"""Numbers set aside per trace."""
+"""Number of random numbers reserved for each trace."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Fractures:
     ends: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 2)))
     """(n, 2, 2) f8: trace, end, x y [m]."""
     sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
-    """(n,) i8 number of the set of each."""
+    """(n,) i8 number of the fracture set of each trace."""
 
     def __len__(self) -> int:
         return len(self.ends)

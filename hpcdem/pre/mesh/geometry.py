@@ -21,7 +21,7 @@ Vector = Sequence[float]
 MOST_SIDES = 100_000
 """Largest number of straight sides of a circle."""
 STEPS_PER_CIRCLE = 8
-"""A circle has at least so many edges, however coarse the mesh."""
+"""Smallest number of edges of a circle, however coarse the mesh."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from hpcdem.pre.mesh import abaqus, gmsh_file, optional
 from hpcdem.pre.mesh.file_mesh import CORNERS, DIMENSIONS, IN_WORDS, Block, FileMesh, listed
 
 SET = "physical"
-"""Groups of the file come into this set."""
+"""Set in which the groups of the file are put."""
 INSTANCES = "instance"
 """Set of the instances of an assembly."""
 FLATNESS = 1e-9

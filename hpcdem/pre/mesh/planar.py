@@ -22,7 +22,7 @@ RATIO = 0.3
 """Least distance between points, and of points from edges, in units of the mesh size. It also bounds angles:
 asin(0.3) = 17 degrees where an edge of full length leaves another."""
 MOST_PIECES = 200_000
-"""A single trace is given up when it takes so many moves: the size is absurd for its length."""
+"""Number of moves at which a single trace is given up, since the mesh size is unreasonable for its length."""
 
 Labels = frozenset[Hashable]
 

@@ -15,7 +15,7 @@ from hpcdem.pre.mesh.sizes import not_too_many, positive
 
 Quad = tuple[int, int, int, int]
 SHARP = 1e-9
-"""Tolerance over the length of a side: points nearer to a line are on it."""
+"""Distance over the length of a side below which a point is on a line."""
 
 
 def densified(mesh: Mesh, elements: np.ndarray, pattern: Sequence[int], most: Sequence[float]) -> Remade:

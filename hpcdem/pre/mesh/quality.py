@@ -37,12 +37,12 @@ class Quality:
     angle_least_at: tuple[float, ...]
     angle_greatest: float
     angles_below: dict[int, int]
-    """Elements with an angle below 10, 20, 30 degrees."""
+    """Number of elements with an angle below 10, 20 and 30 degrees."""
     aspect_mean: float
     aspect_greatest: float
     aspect_greatest_element: int
     altitude_least: float
-    """Least height over an edge; the time step follows it."""
+    """Smallest height of an element over an edge; the time step follows from it."""
     altitude_least_element: int
 
     def lines(self) -> list[str]:
@@ -73,7 +73,7 @@ _BESIDE = {
     4: np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]),
     8: np.array([[1, 3, 4], [0, 2, 5], [1, 3, 6], [0, 2, 7], [0, 5, 7], [1, 4, 6], [2, 5, 7], [3, 4, 6]]),
 }
-"""Corners beside each corner of a tetrahedron, and of a hexahedron."""
+"""Corners adjacent to each corner of a tetrahedron, and of a hexahedron."""
 
 
 def corner_angles(mesh: Mesh) -> np.ndarray:

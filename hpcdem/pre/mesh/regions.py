@@ -14,7 +14,7 @@ from hpcdem.pre.mesh.geometry import Curve, Layers, along, least_steps
 from hpcdem.pre.mesh.sizes import SizeField
 
 GRID = 1e-7
-"""Ends of curves that lie nearer than this part of the mesh size are one point."""
+"""Distance over the mesh size below which ends of curves are one point."""
 
 
 def edges_of_curve(curve: Curve, sizes: SizeField, most: float = math.inf) -> np.ndarray:

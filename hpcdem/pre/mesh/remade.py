@@ -26,9 +26,9 @@ class Moved:
     """Map from faces before a change of the mesh to faces after it, by their points, see `faces`."""
 
     points: np.ndarray
-    """(np,) the number now of each point before, -1 where it is gone."""
+    """(np,) present number of each point of the old mesh, -1 where it was removed."""
     quads: dict[tuple[int, ...], list[tuple[int, ...]]] = field(default_factory=dict)
-    """Halves of sides of hexahedra that are cut otherwise now."""
+    """Halves of sides of hexahedra that are now cut along the other diagonal."""
     pieces: dict[tuple[int, ...], list[tuple[int, ...]]] = field(default_factory=dict)
     """Pieces of faces that were cut."""
 

@@ -15,13 +15,13 @@ from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.geometry import Curve, sampled
 
 GROWTH = 0.2
-"""Edges grow by this much of the distance from a refined layer, by default: neighbours by a fifth."""
+"""Default growth of edges with the distance from a refined layer: neighbours differ by a fifth."""
 MOST_ELEMENTS = 20_000_000
-"""Largest number of elements; more are refused before they are made."""
+"""Largest number of elements; more are refused before the mesh is made."""
 FLAT = 1e-9
-"""Edges that span less than this part of the square, or cube, of the longest are flat."""
+"""Fraction of the square, or cube, of the longest edge: edges that span less are flat."""
 MOST_SAMPLES = 500_000
-"""Points along a refined layer at most."""
+"""Largest number of points along a refined layer."""
 
 
 @dataclass(frozen=True)

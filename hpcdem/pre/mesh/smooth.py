@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from hpcdem.physics.fdem.connectivity import edges_of
 
 SMALLEST = 20.0
-"""Angles [degrees] do not become smaller than this, or than they were."""
+"""Smallest angle [degrees] that smoothing may produce, unless the angle was smaller before."""
 
 
 def smoothed(points: np.ndarray, cells: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, int]:

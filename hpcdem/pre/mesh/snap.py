@@ -18,11 +18,12 @@ import numpy as np
 from hpcdem.pre.mesh.solids import Disc, _frame
 
 LEAST_ANGLE = 15.0
-"""Degrees."""
+"""Smallest angle [degrees] at which discs cross; at smaller angles the later disc is made parallel."""
 NEAR = 0.25
-"""Distance over the length of an edge."""
+"""Distance over the mesh size within which a disc is moved into the plane of a parallel one, or its radius reduced so
+that its rim keeps off the surface."""
 AROUND = 64
-"""Points of a rim that are checked."""
+"""Number of points of a rim that are checked."""
 
 Named = tuple[str, Sequence[Any]]
 
@@ -57,7 +58,7 @@ def snapped(surfaces: Sequence[Named], bodies: Sequence[Any], size: float) -> tu
 
 
 def _aligned(disc: Disc, before: Sequence[Disc], size: float) -> Disc:
-    """Turned into the direction of the first of the earlier discs that it crosses at a small angle."""
+    """Return the disc parallel to the first of the earlier discs that it crosses at a small angle."""
     centre, normal = disc.plane()
     for other in before:
         at, along = other.plane()

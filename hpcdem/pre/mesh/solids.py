@@ -20,12 +20,12 @@ from hpcdem.core.errors import CommandError
 Point = tuple[float, float, float]
 
 IN_PLANE = 1e-6
-"""Corners of a polygon lie in a plane within this part of its size."""
+"""Largest deviation of the corners of a polygon from a plane, over its size."""
 FULL = 360.0
 
 
 class Body:
-    """Something with an inside."""
+    """Solid with an inside."""
 
     surface = False
 
@@ -86,8 +86,8 @@ class Sphere(Body):
         return np.array(self.centre) + self.radius * np.array([[-1.0], [1.0]])
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        way = points - np.array(self.centre)
-        return np.sqrt((way * way).sum(axis=1)) - self.radius
+        offset = points - np.array(self.centre)
+        return np.sqrt((offset * offset).sum(axis=1)) - self.radius
 
     def parts(self, points: np.ndarray) -> list[np.ndarray]:
         return [self.distance(points)]
@@ -236,24 +236,24 @@ class Revolved(Body):
     def _flat(self) -> np.ndarray:
         """(k, 2) corners: along the axis, distance from it towards the polygon [m]; tiny ones are 0."""
         axis, out = _unit(self.axis), self._outwards()
-        way = np.array(self.corners) - self.about
-        flat = np.column_stack([way @ axis, way @ out])
+        offset = np.array(self.corners) - self.about
+        flat = np.column_stack([offset @ axis, offset @ out])
         flat[np.abs(flat[:, 1]) < IN_PLANE * np.ptp(flat, axis=0).max(), 1] = 0.0
         return flat
 
     def _outwards(self) -> np.ndarray:
         """Unit vector from the axis towards the corner that is farthest from it."""
         axis = _unit(self.axis)
-        way = np.array(self.corners) - self.about
-        way = way - (way @ axis)[:, None] * axis
-        return _unit(way[np.argmax((way * way).sum(axis=1))])
+        offset = np.array(self.corners) - self.about
+        offset = offset - (offset @ axis)[:, None] * axis
+        return _unit(offset[np.argmax((offset * offset).sum(axis=1))])
 
     def _turned(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points in the half plane (n, 2), and their angle from the polygon (n,) [rad], from -pi to pi."""
         axis, out = _unit(self.axis), self._outwards()
-        way = points - np.array(self.about)
-        x, y = way @ out, way @ np.cross(axis, out)
-        return np.column_stack([way @ axis, np.hypot(x, y)]), np.arctan2(y, x)
+        offset = points - np.array(self.about)
+        x, y = offset @ out, offset @ np.cross(axis, out)
+        return np.column_stack([offset @ axis, np.hypot(x, y)]), np.arctan2(y, x)
 
     def bounds(self) -> np.ndarray:
         axis = _unit(self.axis)
@@ -280,10 +280,10 @@ class Revolved(Body):
     def _planes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance before the first and behind the last half plane."""
         axis, out = _unit(self.axis), self._outwards()
-        way, turn = points - np.array(self.about), math.radians(self.angle)
+        offset, turn = points - np.array(self.about), math.radians(self.angle)
         across = np.cross(axis, out)
         last = math.cos(turn) * across - math.sin(turn) * out
-        return -(way @ across), way @ last
+        return -(offset @ across), offset @ last
 
 
 @dataclass(frozen=True)
@@ -301,8 +301,8 @@ class Shell(Body):
         if ((of == np.roll(of, 1, axis=1)).any(axis=1)).any():
             where = int(np.flatnonzero((of == np.roll(of, 1, axis=1)).any(axis=1))[0])
             raise CommandError(f"triangle {where + 1} of the shell has the same corner twice")
-        ways = np.concatenate([of, np.roll(of, -1, axis=1)]).reshape(2, -1).T
-        found, times = np.unique(ways, axis=0, return_counts=True)
+        edges = np.concatenate([of, np.roll(of, -1, axis=1)]).reshape(2, -1).T
+        found, times = np.unique(edges, axis=0, return_counts=True)
         back = {(int(b), int(a)) for a, b in found}
         lost = [(a, b) for a, b in found.tolist() if (a, b) not in back]
         if lost or (times > 1).any():
@@ -381,7 +381,7 @@ class Brep(Body):
 
 
 class Surface:
-    """Something without an inside."""
+    """Surface without an inside."""
 
     surface = True
 
@@ -452,9 +452,9 @@ class Disc(Surface):
 
     def beyond(self, points: np.ndarray) -> np.ndarray:
         at, normal = self.plane()
-        way = points - at
-        way = way - (way @ normal)[:, None] * normal
-        return np.sqrt((way * way).sum(axis=1)) - self.radius
+        offset = points - at
+        offset = offset - (offset @ normal)[:, None] * normal
+        return np.sqrt((offset * offset).sum(axis=1)) - self.radius
 
 
 @dataclass(frozen=True)
@@ -594,14 +594,14 @@ def outline_distance(corners: np.ndarray, at: np.ndarray, on_axis: bool = False)
     if on_axis:  # on the axis itself no side decides whether a point is inside: one a hair away from it does
         y = np.maximum(y, 1e-9 * float(np.ptp(corners, axis=0).max()))
     for a, b in _sides(corners):
-        way = b - a
+        edge = b - a
         if not (on_axis and a[1] == b[1] == 0.0):
-            t = np.clip((at - a) @ way / (way @ way), 0.0, 1.0)
-            rest = at - a - t[:, None] * way
+            t = np.clip((at - a) @ edge / (edge @ edge), 0.0, 1.0)
+            rest = at - a - t[:, None] * edge
             far = np.minimum(far, np.sqrt((rest * rest).sum(axis=1)))
-        if way[1] != 0.0:
+        if edge[1] != 0.0:
             crosses = (a[1] > y) != (b[1] > y)
-            inside ^= crosses & (x < a[0] + (y - a[1]) * way[0] / way[1])
+            inside ^= crosses & (x < a[0] + (y - a[1]) * edge[0] / edge[1])
     return np.where(inside, -far, far)
 
 
@@ -611,8 +611,8 @@ def _sides(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def _from_line(a: np.ndarray, b: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Distance (n,) of points (n, 2) from the line through two others."""
-    way = (b - a) / math.sqrt((b - a) @ (b - a))
-    return (at[:, 0] - a[0]) * way[1] - (at[:, 1] - a[1]) * way[0]
+    edge = (b - a) / math.sqrt((b - a) @ (b - a))
+    return (at[:, 0] - a[0]) * edge[1] - (at[:, 1] - a[1]) * edge[0]
 
 
 def _from_triangle(triangle: np.ndarray, points: np.ndarray) -> np.ndarray:

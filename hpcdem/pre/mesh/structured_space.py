@@ -14,7 +14,8 @@ from hpcdem.physics.fdem.tetrahedra import volumes
 from hpcdem.pre.mesh.sizes import not_too_many
 
 SPLITS = (5, 6, 12)
-"""Tetrahedra of a box: 5, mirrored from box to box; 6 about one diagonal (Kuhn); 12 about a point in the middle."""
+"""Numbers of tetrahedra into which a box can be divided: 5, mirrored from box to box; 6 about one diagonal (Kuhn); 12
+about a point in the middle."""
 SIDES = (("left", 0, 0), ("right", 0, -1), ("front", 1, 0), ("back", 1, -1), ("bottom", 2, 0), ("top", 2, -1))
 
 
@@ -64,9 +65,9 @@ def of_grid(grid: np.ndarray, split: int = 6, group: tuple[str, str] | None = No
         even: list[list[tuple[int, ...]]] = [[(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)]]
         even += [[a, *(_step(a, axis) for axis in range(3))] for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1))]
         turned = [[(1 - a[0], a[1], a[2]) for a in part] for part in even]
-        ways = [np.column_stack([corner[a] for a in part]) for part in even]
+        corners = [np.column_stack([corner[a] for a in part]) for part in even]
         others = [np.column_stack([corner[a] for a in part]) for part in turned]
-        cells = _upright(points, [list(np.where(odd, other, one).T) for one, other in zip(ways, others)])
+        cells = _upright(points, [list(np.where(odd, other, one).T) for one, other in zip(corners, others)])
     layers = {name: _triangles_on(cells, _side(number, axis, end)) for name, axis, end in SIDES}
     groups = {group[0]: {group[1]: np.arange(len(cells))}} if group else {}
     return Mesh.of(points, cells, groups, layers)

@@ -34,9 +34,9 @@ DELAUNAY, FRONTAL_DELAUNAY, FRONTAL_QUADS = 5, 6, 8
 BLOSSOM = 1
 """Number of gmsh's recombination: a perfect matching of triangles, as far as there is one."""
 SHARP = 10.0
-"""Smaller angles [degrees] are worth a note."""
+"""Angle [degrees] below which an element is reported."""
 FLATTEST = 165.0
-"""A quad with a greater angle [degrees] stays two triangles."""
+"""Angle [degrees] of a quad above which it stays two triangles."""
 
 
 _OPTIONS = {
@@ -65,7 +65,7 @@ class Region:
     group: str | None = None
     set_name: str = "default"
     size: float | None = None
-    """Mesh size inside [m]; None: the size of the mesh."""
+    """Mesh size inside the region [m]; None: the mesh size of the model."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,9 @@ class MeshSettings:
     fractures: Fractures = field(default_factory=Fractures)
     refine: Sequence[Refinement] = ()
     irregular: bool = False
-    """Triangles in no pattern: rows of them would lead cracks."""
+    """Whether triangles are placed without a pattern: rows of them would guide cracks."""
     smooth: bool = False
-    """Inner points in the middle of their neighbours (`smoothing`); points on lines stay."""
+    """Whether inner points are moved to the middle of their neighbours (`smoothing`); points on lines stay."""
 
 
 @dataclass(frozen=True)

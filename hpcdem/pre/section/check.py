@@ -14,11 +14,11 @@ from hpcdem.pre.mesh.geometry import Curve, arc_of, polyline
 from hpcdem.pre.section.shapes import Section
 
 SMALLEST = 1e-9
-"""Overlaps and gaps of less than this part of the area of all polygons are rounding."""
+"""Fraction of the area of all polygons: overlaps and gaps that are smaller are attributed to rounding."""
 NARROW = 1e-3
-"""Gaps that are open to the outside count if they are narrower than this part of the size of the section."""
+"""Fraction of the size of the section: gaps that are open to the outside count if they are narrower."""
 NEARLY = 0.05
-"""A line whose ends are nearer than this part of its length may be meant as a ring."""
+"""Fraction of its length: a line whose ends are nearer to each other may be meant as a ring."""
 MOST = 5
 """Number of faults of each kind that are named individually."""
 

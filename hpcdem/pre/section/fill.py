@@ -18,14 +18,15 @@ POROSITY = 0.2
 """Porosity of the filling. That of a dense packing of discs of similar radii is 0.16 to 0.18; layers a few discs thick
 are looser."""
 ROUNDS, RENEW = 300, 10
-"""Rounds of relaxation at most; rounds between two searches for neighbours."""
+"""Largest number of rounds of relaxation, and number of rounds between two searches for neighbours."""
 DONE = 0.02
-"""Overlap, over the sum of two radii, below which the relaxation ends."""
+"""Overlap over the sum of two radii below which the relaxation ends."""
 SKIN = 0.6
 """Margin of the search for neighbours, over the largest radius."""
 MOST_DISCS = 20_000_000
 MOST_POINTS = 4 * MOST_DISCS
-"""Points of a lattice over the box of a polygon: an inclined layer as wide as a disc would need any number of them."""
+"""Largest number of lattice points over the box of a polygon: an inclined layer as thin as a disc would need an
+unlimited number."""
 
 
 @dataclass(frozen=True)

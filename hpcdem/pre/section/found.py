@@ -15,7 +15,7 @@ from hpcdem.pre.mesh.geometry import Curve
 from hpcdem.pre.section.shapes import Placement, Shape, made_curve
 
 NAMES = ("name", "layer", "unit", "formation", "label", "id")
-"""Attributes that name a shape, the first of them that a shape has; upper and lower case are the same."""
+"""Attributes that name a shape: the first of them that a shape has counts; upper and lower case are the same."""
 MOST_POINTS = 5_000_000
 
 

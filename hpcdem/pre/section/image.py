@@ -16,10 +16,11 @@ from hpcdem.pre.section.found import Found
 TOLERANCE = 40
 """Largest difference of red, green or blue (0 to 255) of a pixel from its colour in the legend."""
 SPECK = 9
-"""Smaller pieces of one colour, in pixels, go to their neighbours: noise of compressed images and smoothed edges."""
+"""Number of pixels below which a piece of one colour is joined to its neighbours: noise of compressed images and
+smoothed edges."""
 MOST_PIXELS = 50_000_000
 OUTSIDE = "-"
-"""Name in a legend of what is no part of the model."""
+"""Name, in a legend, of the colour that is no part of the model."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from hpcdem.pre.section.found import Found
 
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 STEPS = 64
-"""Straight parts of a curve of a path: a quarter of a circle then deviates by 1.5e-4 of its radius."""
+"""Number of straight parts of a curve of a path: a quarter of a circle then deviates by 1.5e-4 of its radius."""
 
 
 def read_svg(found: Found) -> None:

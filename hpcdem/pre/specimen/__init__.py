@@ -191,11 +191,11 @@ def make_specimen(request: Request) -> Specimen:
         return _made(request, curve, request.number, None)
     assert request.width is not None
     # The mean area of a grain follows from the classes' shares, the shape's mean from those grains.
-    room = request.slenderness * request.width**2 / (1.0 + request.void_ratio)
+    space = request.slenderness * request.width**2 / (1.0 + request.void_ratio)
     share = number_of.weights(curve, request.mass_exponent)
     circle = 0.25 * math.pi * float(share @ (curve.sizes * MM) ** 2)
     unit, _ = _bodies(request, np.ones(1000))
-    wanted = room / (circle * float(moments(unit)[0].mean()) / (0.25 * math.pi))
+    wanted = space / (circle * float(moments(unit)[0].mean()) / (0.25 * math.pi))
     if not 0.5 <= wanted <= MOST:
         raise CommandError(f"a box {request.width:g} m wide contains {wanted:.3g} such grains, expected 1 to {MOST}")
     return _made(request, curve, max(1, round(wanted)), request.width)

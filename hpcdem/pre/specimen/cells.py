@@ -9,7 +9,7 @@ import numpy as np
 from hpcdem.pre.specimen.shapes import numbers
 
 ORDER, ACROSS, UP = 21, 22, 23
-"""Streams of random numbers."""
+"""Numbers of the streams of random numbers."""
 
 
 def order(number: int, seed: int) -> np.ndarray:

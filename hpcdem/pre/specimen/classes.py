@@ -15,9 +15,9 @@ from hpcdem.pre.specimen.grading import Grading
 from hpcdem.pre.specimen.shapes import SIDES
 
 SMOOTH = 1e-6
-"""Ends of arcs where the normal turns by less [rad] are no corners."""
+"""Angle [rad] between the normals of two arcs below which their common end is no corner."""
 SAME = 1e-4
-"""Sizes that differ by less, relatively, are of one class."""
+"""Relative difference below which two sizes belong to one class."""
 _NAMES = {sides: name for name, sides in SIDES.items()}
 
 

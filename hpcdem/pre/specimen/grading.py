@@ -14,7 +14,7 @@ from hpcdem.core.errors import CommandError, HpcdemError, ScriptError
 MOST_SIZES = 1000
 """Largest number of rows of a grading; a laboratory has a few dozen sieves."""
 SMALLEST, LARGEST = 1e-6, 1e9
-"""Sizes [mm] that are taken for grains: from a nanometre to a thousand kilometres."""
+"""Smallest and largest admissible size of a grain [mm]: from a nanometre to a thousand kilometres."""
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from hpcdem.pre.specimen.files import group_of
 
 GRAVITY, DENSITY, FRICTION = 9.81, 2650.0, 0.5
 OVERLAP = 1e-3
-"""Overlap at rest over the diameter of a grain, about."""
+"""Approximate overlap at rest over the diameter of a grain."""
 IMPACT = 0.1
-"""Largest overlap over the radius of a disc that falls down through the whole room."""
+"""Largest overlap, over its radius, of a disc that falls down through the whole space above the specimen."""
 FRACTION = 0.15
 """Time step over sqrt(m / k) of the smallest grain."""
 CONFINING, STIFFNESS = 100e3, 500.0
@@ -167,15 +167,15 @@ if sim.rank == 0:
 
 def deposit(specimen: Specimen) -> str:
     """Return a script of commands in which the grains fall and settle between walls."""
-    width, room = specimen.density.room
+    width, opening = specimen.density.room
     radius, mass = _smallest(specimen)
     solid = float(specimen.area.sum())
     weight = DENSITY * GRAVITY * solid / width  # stress at the floor [Pa]
-    fall = math.sqrt(2.0 * GRAVITY * max(room - solid / width, 0.0))
+    fall = math.sqrt(2.0 * GRAVITY * max(opening - solid / width, 0.0))
     # A disc that hits at v is stopped after v sqrt(m / k).
     kn = max(weight / OVERLAP, mass * (fall / (IMPACT * radius)) ** 2)
     dt = _rounded(FRACTION * math.sqrt(mass / kn))
-    time = 3.0 * math.sqrt(2.0 * room / GRAVITY)
+    time = 3.0 * math.sqrt(2.0 * opening / GRAVITY)
     is_circle = specimen.request.shape == "circle"
     file = file_of(specimen)
     sizes, counts = specimen.grading.sizes.tolist(), specimen.counts.tolist()
@@ -185,7 +185,7 @@ def deposit(specimen: Specimen) -> str:
     )
     return _DEPOSIT.substitute(
         file=file, grains=_kinds(specimen), width_mm=f"{1e3 * width:.4g}", width=f"{width:.12g}",
-        top=f"{1.05 * room + 2.0 * float(specimen.reach.max()):.6g}", begin=f"LOAD {file}" if is_circle else
+        top=f"{1.05 * opening + 2.0 * float(specimen.reach.max()):.6g}", begin=f"LOAD {file}" if is_circle else
         f"START\nCLUMP file {file}", dt=f"{dt:g}", kn=f"{_rounded(kn):g}", gravity=f"{GRAVITY:g}",
         density=f"{DENSITY:g}", friction=f"{FRICTION:g}", steps=math.ceil(time / dt / 1000.0) * 1000,
         colours=colours if is_circle else "", end="EXP deposited.xyr group\n" if is_circle else "",
@@ -197,7 +197,7 @@ def biaxial(specimen: Specimen) -> str:
     """Return a Python program in which the grains are compressed between four walls to a stress, then shortened at
     constant side stress.
     """
-    width, room = specimen.density.room
+    width, opening = specimen.density.room
     _, mass = _smallest(specimen)
     kn = STIFFNESS * CONFINING
     size = math.sqrt(float((specimen.area * specimen.size).sum() / specimen.area.sum() * specimen.size.mean()))
@@ -205,7 +205,7 @@ def biaxial(specimen: Specimen) -> str:
     file = file_of(specimen)
     return _BIAXIAL.substitute(
         file=file, grains=_kinds(specimen), stress=f"{CONFINING:g}", friction=f"{FRICTION:g}", width=f"{width:.12g}",
-        height=f"{room:.12g}", size=f"{size:.4g}", kn=f"{kn:g}", stiffness=f"{STIFFNESS:g}", density=f"{DENSITY:g}",
+        height=f"{opening:.12g}", size=f"{size:.4g}", kn=f"{kn:g}", stiffness=f"{STIFFNESS:g}", density=f"{DENSITY:g}",
         rate=f"{_rounded(INERTIAL / (size * math.sqrt(DENSITY / CONFINING))):g}",
         dt=f"{_rounded(FRACTION * math.sqrt(mass / kn)):g}",
         begin=f'sim.load("{file}")' if is_circle else f'sim.clump("{file}")',

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 SPHERES = {"on": False, "hex": False, "off": True, "0": True}
-"""Which rules make spheres (area of bonds, moment of inertia)."""
+"""Whether a mass rule treats discs as spheres (area of bonds, moment of inertia)."""
 
 
 def shape(disk: str) -> tuple[float, bool, float]:

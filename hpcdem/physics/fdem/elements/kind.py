@@ -182,7 +182,7 @@ SIX_NODE_TRIANGLE = Kind(
     stored=six.PARTS, cells=((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)), shape=3, stress_of_parts=True,
     laws=("mech_iso_elastic",),
 )  # fmt: skip
-"""Its nodes 3, 4, 5 are between 0 and 1, 1 and 2, 2 and 0."""
+"""Triangle with nodes 3, 4 and 5 in the middle of the edges 0-1, 1-2 and 2-0."""
 KINDS = TRIANGLE, QUAD, TETRAHEDRON, HEXAHEDRON, SIX_NODE_TRIANGLE
 MACROS = {kind.dim: kind for kind in KINDS if kind.stored > 1}
 """Macro-elements by dimension: a mesh has one kind of them at most."""
