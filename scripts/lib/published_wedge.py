@@ -81,7 +81,9 @@ def measured(folder: Path) -> np.ndarray:
         p = frame.tables["particles"].columns
         x, y, group = (np.asarray(p[name]) for name in ("x", "y", "group"))
         rows = {name.lower(): k for k, name in enumerate(frame.group_names) if name.lower().endswith("_wall")}
-        rock = ~np.isin(group, list(rows.values())) & (y > BASE) & (x < x[group == rows["rig_wall"]].min())
+        rock = ~np.isin(group, list(rows.values())) & (y >= BASE)
+        if "rig_wall" in rows:
+            rock &= x < x[group == rows["rig_wall"]].min()
         shape = wedge(*surface(x[rock], y[rock], COLUMN))
         found[km - 1] = (shape.crest[1] - BASE) / 1e3, shape.toe[0] / 1e3, shape.slope
     return found

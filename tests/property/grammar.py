@@ -261,7 +261,7 @@ class Maker:
         if self.around:
             sides = self.left - 2 * r, self.left + self.width + 2 * r
             self.add("PERIODIC x", point(*sides))
-            if boxed and self.chance(40):
+            if boxed and self.chance(80):
                 self.add(f"HIST id 8 interval {self.whole(5, 40)}, {self.pick('sxx', 'syy', 'sxy', 'period')}")
             if self.chance(60):
                 self.wall(0, (sides[0], self.bottom), (sides[1], self.bottom), fric)
@@ -296,7 +296,7 @@ class Maker:
         high = f"y {number(self.bottom)} {number(self.bottom + self.height)}" if self.chance(30) else ""
         if self.chance(20):
             self.add("START")
-        self.add("LOAD", POINTS, self.perhaps(30, "scale 1.0"), limits, high)
+        self.add("LOAD", POINTS, self.perhaps(50, "scale 1.0"), limits, high)
 
     def populate(self) -> None:
         """One to three kinds of particles, then what they are made of."""
@@ -442,7 +442,7 @@ class Maker:
             keys += [self.perhaps(20, "rfric 0.2"), self.perhaps(20, "rdamp 0.3")]
         if not self.accounts:
             push = number(1e-3 * self.stiffness)
-            keys += [self.perhaps(15, f"xp {push}"), self.perhaps(15, f"yp -{push}")]
+            keys += [self.perhaps(25, f"xp {push}"), self.perhaps(30, f"yp -{push}")]
             self.pressed |= any(key.startswith(("xp", "yp")) for key in keys)
         self.add("PROP", *(keys if any(keys) else ["color black"]), self.range())
 

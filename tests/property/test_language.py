@@ -126,7 +126,7 @@ def test_the_models_use_every_word_of_the_language() -> None:
                     used.update({(command.name, option.name)} if option else ())
             used.update((command.name, option.name) for option in command.leading if option.kind is not t.FLAG)
 
-    @settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=1000, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(good_models())
     def body(model: Model) -> None:
         collect(model.text)

@@ -94,7 +94,7 @@ def assert_rich(seen: list[dict[str, Any]]) -> None:
 
 def test_twenty_models(pair: Pair) -> None:
     """Always the same sequence, in which enough happens."""
-    assert_rich(explore(pair, QUICK, 1))
+    assert_rich(explore(pair, QUICK, 2))
 
 
 @pytest.mark.slow

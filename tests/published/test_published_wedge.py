@@ -55,13 +55,15 @@ def test_probability_of_one_more_run():
 
 
 def test_frames_without_their_walls(tmp_path):
-    """A bed that falls by 15 degrees from 2 km at x = 0, and a row of particles far above it that is a wall."""
+    """A bed that falls by 15 degrees from 2 km at x = 0, rows of particles that are walls, one far above it, and a
+    particle that has slipped through the right one."""
     x, y = (v.ravel() for v in np.meshgrid(np.arange(0.0, 12_000.0, 50.0), np.arange(1000.0, 3100.0, 50.0)))
     rock = y <= 1000.0 + np.maximum(2000.0 - x * np.tan(np.radians(15.0)), 200.0)
-    x, y = np.append(x[rock], np.full(9, 20.0)), np.append(y[rock], np.linspace(6000.0, 7000.0, 9))
+    x = np.concatenate([x[rock], [14_000.0], np.full(9, 20.0), np.full(9, 12_000.0)])
+    y = np.concatenate([y[rock], [300.0], np.linspace(6000.0, 7000.0, 9), np.linspace(1000.0, 1400.0, 9)])
     made = frame(20_000, x, y, 0.0)
-    made.tables["particles"].columns["group"] = np.append(np.zeros(len(x) - 9), np.ones(9)).astype(np.int32)
-    made.group_names[:] = ["rock", "lef_wall"]
+    made.tables["particles"].columns["group"] = np.repeat([0, 1, 2], [len(x) - 18, 9, 9]).astype(np.int32)
+    made.group_names[:] = ["rock", "lef_wall", "rig_wall"]
     write_vtkhdf(tmp_path / "all_0000020000.vtkhdf", made, SerialComm())
     found = wedges.measured(tmp_path)
     assert np.isnan(found[0]).all() and np.isfinite(found).sum() == 3

@@ -157,15 +157,15 @@ def test_rollers_on_oblique_planes():
     uniaxial strain along the bar."""
     flat = box((4, 2, 2), (1.2, 0.6, 0.5), 6)
     axis = np.array([1.0, 2.0, 3.0]) / math.sqrt(14.0)
-    way = equilibrium._ways(axis)[0][:, [0, 2, 1]]  # a reflection no more
-    mesh = Mesh.of(flat.points @ way.T, flat.cells)
+    basis = equilibrium._basis(axis)[0][:, [0, 2, 1]]  # a rotation, no reflection
+    mesh = Mesh.of(flat.points @ basis.T, flat.cells)
     sim = body(mesh, dynamic=False)
     sim.option(large_strain=False)
     x, y, z = flat.points.T
     on_y, on_z = (y < 1e-9) | (y > 0.6 - 1e-9), (z < 1e-9) | (z > 0.5 - 1e-9)
     end = x > 1.2 - 1e-9
-    sim.move_constraint(np.flatnonzero(on_y & ~on_z), space.ACROSS, tuple(way[:, 1]))
-    sim.move_constraint(np.flatnonzero(on_z & ~on_y), space.ACROSS, tuple(way[:, 2]))
+    sim.move_constraint(np.flatnonzero(on_y & ~on_z), space.ACROSS, tuple(basis[:, 1]))
+    sim.move_constraint(np.flatnonzero(on_z & ~on_y), space.ACROSS, tuple(basis[:, 2]))
     sim.move_constraint(np.flatnonzero(on_y & on_z), space.ALONG, tuple(axis))
     fixed = np.flatnonzero(x < 1e-9)
     sim.velocity_condition(fixed, vx=0.0, vy=0.0, vz=0.0)
@@ -179,7 +179,7 @@ def test_rollers_on_oblique_planes():
     xx, yy, zz, xy, xz, yz = (diagnostics.values(sim, name) for name in STRESSES)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     for k, want in enumerate((stress, stress * LAME / (LAME + 2 * SHEAR), stress * LAME / (LAME + 2 * SHEAR))):
-        assert np.einsum("i,ijn,j->n", way[:, k], tensor, way[:, k]) == pytest.approx(want, rel=1e-8)
+        assert np.einsum("i,ijn,j->n", basis[:, k], tensor, basis[:, k]) == pytest.approx(want, rel=1e-8)
 
 
 def test_weight_on_rollers():

@@ -324,7 +324,7 @@ def test_a_history_of_deflection_continues_after_the_last_base_has_ended(tmp_pat
 def test_commands_on_a_base_that_bends(tmp_path):
     sim = empty(tmp_path)
     load(sim, np.array([0.0]))
-    with pytest.raises(CommandError, match="FLEXURE must precede it"):
+    with pytest.raises(CommandError, match="no base bends yet; give FLEXURE first"):
         history.hist(sim, 1, 10, "deflection")
     flexure.flexure(sim, 1, **PLATE)
     for change in ({"yv": 1.0}, {"nodes": ((0.0, 0.0), (1.0, 0.0))}, {"delete": True}):

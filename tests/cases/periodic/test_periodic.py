@@ -308,7 +308,7 @@ def test_frames_hold_places_between_the_sides_and_continuous_ones(tmp_path):
     with pytest.raises(HpcdemError, match=r"does not contain the crossings of the particles .laps.; measure frames"):
         grains(path.with_suffix(".dat"))
     with pytest.raises(HpcdemError, match="periodic"):
-        strain_stress.look(path, strain_stress.Options(tmp_path, 0.5))
+        strain_stress.read_snapshot(path, strain_stress.Options(tmp_path, 0.5))
 
 
 def test_a_range_takes_particles_by_their_place_between_the_sides(tmp_path):
