@@ -118,8 +118,10 @@ def check_surface(given: Mapping[str, Any]) -> None:
         return
     if not active:
         raise CommandError(f"nothing to do; give one or more of {', '.join(PROCESSES)}, or off")
-    if not given.get("interval", 0) >= 1:
-        raise CommandError(f"interval must be at least 1 step, got {given.get('interval')}")
+    if "interval" not in given:
+        raise CommandError("give interval, the number of steps between two applications")
+    if given["interval"] < 1:
+        raise CommandError(f"interval must be at least 1 step, got {given['interval']}")
     for name in ("diffuse", "erode", "deposit", "years", "spacing"):
         if name in given and not 0.0 < given[name] <= LARGEST:
             raise CommandError(f"{name} must be above 0, got {given[name]:g}")

@@ -127,7 +127,9 @@ def read_settings(path: Path) -> Settings:
     """A file of settings. UsageError or ScriptError for what cannot be, before anything runs."""
     try:
         given = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+    except OSError as problem:
+        raise UsageError(f"{path}: cannot read the settings: {problem.strerror or problem}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
         raise UsageError(f"{path}: {problem}") from None
     _known(path, "", given)
     for name in ("test", "parameters"):

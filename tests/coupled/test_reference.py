@@ -68,7 +68,7 @@ def test_forces(tmp_path, kind: str, hertz: bool) -> None:
     assert (seen > 3).all()
 
 
-def test_what_is_reported_contacts() -> None:
+def test_reported_contacts() -> None:
     """A linear disc on one face and one after Hertz on another, which is steeper; a third slot does not touch any more:
     forces, places, overlaps and energies by hand."""
     hot = np.zeros((3, WIDTH))

@@ -49,7 +49,7 @@ def said(rock: Rock, words: str) -> list[str]:
 @pytest.mark.parametrize(
     ("bulk", "chosen"), [pytest.param(1e6, "explicit", marks=pytest.mark.slow), (1e12, "implicit")]
 )
-def test_flow_alone_goes_the_cheaper_method(tmp_path, bulk, chosen) -> None:
+def test_flow_alone_takes_the_cheaper_method(tmp_path, bulk, chosen) -> None:
     """Water that is soft, or stiff: few long sub-steps, or many short ones; the same pressures as by implicit steps."""
     script = STRIP.replace("BULK", f"{bulk:g}")
     rock, other = Rock(tmp_path / "a", script), Rock(tmp_path / "b", script)
@@ -64,8 +64,8 @@ def test_flow_alone_goes_the_cheaper_method(tmp_path, bulk, chosen) -> None:
 
 
 @pytest.mark.slow
-def test_blocks_go_the_cheaper_method(tmp_path) -> None:
-    """In static runs by the clock that was said, if that is stable."""
+def test_blocks_take_the_cheaper_method(tmp_path) -> None:
+    """In static runs by the assigned clock, if that is stable."""
     rock = Rock(tmp_path / "a", HALVES.replace("BULK", "1e6"))
     rock("pcdc model time-step hydraulic 2e-3\npcdc model solve hydraulic auto time 0.1\n")
     assert "auto: explicit steps; explicit: 50 steps of 0.002 s" in said(rock, "auto")[0]

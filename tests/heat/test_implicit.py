@@ -135,7 +135,7 @@ def test_blocks_are_in_equilibrium_at_the_end_of_each_step() -> None:
     assert sim.clock.step == 4
 
 
-def test_heat_breaks_joints_meanwhile() -> None:
+def test_joints_break_during_implicit_steps() -> None:
     """A bar between walls is cooled until its joints break, and is then free of stress, and insulated."""
     sim = model(rectangle(6, 1, 0.6, 0.1, kind="quad"))
     sim.option(dynamic=False, collision=False)

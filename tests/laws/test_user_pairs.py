@@ -341,7 +341,7 @@ def test_energy_is_refused_by_name_where_a_law_does_not_define_it(tmp_path):
     sim = two(tmp_path, law=UNTOLD)
     with pytest.raises(CommandError, match=r"SET energy: the stored energy of the law pairs\.py:untold is not known"):
         settings.set_option(sim, "energy", 10)
-    with pytest.raises(CommandError, match=r"HIST energy: the stored energy of the law pairs\.py:untold is not known"):
+    with pytest.raises(CommandError, match=r"^energy: the stored energy of the law pairs\.py:untold is not known"):
         history.hist(sim, 1, 10, "energy")
 
 

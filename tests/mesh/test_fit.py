@@ -94,7 +94,7 @@ def test_blocks_of_all_kinds_are_glued(below: int | str, above: int | str, cells
         )  # points change their numbers only
 
 
-def test_what_cannot_be_glued_is_reported_with_its_place() -> None:
+def test_what_cannot_be_glued_is_reported_with_its_position() -> None:
     small = structured_space.box(lines((0.25, 0.75, 1), (0.25, 0.75, 1), (1, 2, 1)), 6, NAME)
     found = glue.glued(joined(block(0, 1, 2, 2), small)).mesh  # faces that are covered in part are cut around it
     check(found)

@@ -67,16 +67,16 @@ def test_a_mesh_fills_it_and_its_faces_lie_on_it(given: tuple, volume: float, er
 
 
 @pytest.mark.parametrize("given", [one for one, _, _ in BODIES], ids=NAMES)
-def test_distances_do_not_grow_faster_than_the_distance(given: tuple) -> None:
+def test_distances_to_a_body_differ_by_no_more_than_the_points(given: tuple) -> None:
     """|d(a) - d(b)| <= |a - b|, and the sign changes at the surface only."""
     body = made(*given)
     low, high = body.bounds()
     rng = np.random.default_rng(3)
     a = low - 0.5 + (high - low + 1.0) * rng.random((4000, 3))
     b = a + rng.normal(size=a.shape) * 0.05
-    way = np.linalg.norm(a - b, axis=1)
+    apart = np.linalg.norm(a - b, axis=1)
     da, db = body.distance(a), body.distance(b)
-    assert (np.abs(da - db) <= way * (1.0 + 1e-9) + 1e-12).all()
+    assert (np.abs(da - db) <= apart * (1.0 + 1e-9) + 1e-12).all()
 
 
 def test_bodies_come_back_from_a_checkpoint_as_they_were() -> None:

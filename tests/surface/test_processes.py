@@ -162,6 +162,21 @@ def test_what_is_buried_is_compacted(tmp_path) -> None:
     assert max(sim.lands[1].levels.values()) > levels.max()
 
 
+def test_radii_in_another_unit_are_refused(tmp_path) -> None:
+    """Discs of 900 m in a box of 40 m; with columns of a given width, they are refused for these."""
+    sim = model(tmp_path, dt=2e-3, gravity=(0.0, -10.0))
+    walls.box(sim, 0.0, 40.0, 0.0, 20.0)
+    deposit = {"below": 12.0, **SAND, "rad": [900.0]}
+    with pytest.raises(
+        CommandError, match="4 times the largest radius, 3600 m, is wider than BOX, 0 to 40 m; check the"
+    ):
+        surface.surface(sim, 1, 100, **deposit)
+    with pytest.raises(CommandError, match="spacing 8 m is less than a largest particle, 1800 m"):
+        surface.surface(sim, 1, 100, spacing=8.0, **deposit)
+    surface.surface(sim, 1, 100, **{**deposit, "rad": [10.0]})
+    assert list(sim.lands) == [1] and sim.lands[1].spacing == 40.0
+
+
 def test_a_process_given_again_continues_its_balance(scarp: str, tmp_path) -> None:
     """Rates that change every 130 steps, in mid-interval, with columns of another width: one balance for all, areas at
     rate x time, episodes that go on, and ids of eroded deposits that BALL cannot take."""
@@ -195,6 +210,7 @@ def test_a_process_given_again_continues_its_balance(scarp: str, tmp_path) -> No
     ("words", "message"),
     [
         ({"interval": 0, "diffuse": 1.0}, "interval must be at least 1 step"),
+        ({"diffuse": 1.0}, "give interval, the number of steps between two applications"),
         ({"interval": 5}, "nothing to do; give one or more of diffuse, slope"),
         ({"interval": 5, "diffuse": -1.0}, "diffuse must be above 0, got -1"),
         ({"interval": 5, "erode": math.nan, "above": 3.0}, "erode must be above 0, got nan"),

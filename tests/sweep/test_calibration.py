@@ -183,6 +183,11 @@ def test_settings_that_make_no_sense(tmp_path, old, new, message):
         read_settings(path)
 
 
+def test_missing_settings(tmp_path):
+    with pytest.raises(HpcdemError, match=r"none\.toml: cannot read the settings: No such file or directory$"):
+        read_settings(tmp_path / "none.toml")
+
+
 def test_numbers_of_a_history(tmp_path):
     x = np.linspace(0.0, 1.0, 101)
     y = np.where(x < 0.6, 50.0 * x, 30.0 - 20.0 * (x - 0.6))

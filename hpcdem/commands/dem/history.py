@@ -22,13 +22,11 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
     if what == "energy" and (law := sim.own_laws.unaccounted()):
-        raise CommandError(
-            f"HIST energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)"
-        )
+        raise CommandError(f"energy: the stored energy of the law {law} is not known: define it with pair_law(energy=)")
     if what == "deflection" and not sim.bases:
-        raise CommandError("HIST deflection: no base bends yet; give FLEXURE first")
+        raise CommandError("deflection: no base bends yet; give FLEXURE first")
     if what == "period" and not sim.settings.period:
-        raise CommandError("HIST period: the sides are not periodic yet; give PERIODIC first")
+        raise CommandError("period: the sides are not periodic yet; give PERIODIC first")
     if what in mean_stress.COMPONENTS:
         mean_stress.heights(sim)
     sim.history_origins.pop(id, None)

@@ -134,6 +134,12 @@ def surface(
         raise CommandError(f"spacing {wide:g} m is less than a largest particle, {2.0 * largest:g} m")
     if x is not None and not x[1] - x[0] >= wide:
         raise CommandError(f"x from {x[0]:g} to {x[1]:g} m is narrower than a column, {wide:g} m")
+    box = sim.walls.box()
+    if spacing is None and box is not None and wide > box[1] - box[0]:
+        raise CommandError(
+            f"a column of {WIDE:g} times the largest radius, {wide:g} m, is wider than BOX, "
+            f"{box[0]:g} to {box[1]:g} m; check the radii, or give spacing"
+        )
     for name, level in (("above", above), ("below", below)):
         _refuse_deep(sim, name, level)
     names = _groups(sim, (only,) if isinstance(only, str) else only)

@@ -133,11 +133,11 @@ def periodic(sim: Simulation, x: tuple[float, float] | None = None, xv: float | 
         that pass the sides change their velocity by xv (default: unchanged).
     """
     if xv is not None and not math.isfinite(xv):
-        raise CommandError(f"PERIODIC: xv must be a finite number, got {xv:g}")
+        raise CommandError(f"xv must be a finite number, got {xv:g}")
     if x is not None:
         _make_periodic(sim, x)
     elif xv is None or not sim.settings.period:
-        raise CommandError("PERIODIC: give x, the left and the right side")
+        raise CommandError("give x, the left and the right side, before or with xv")
     if xv is not None:
         sim.open_model()
         periodic_sides.strain(sim, xv)
@@ -148,9 +148,9 @@ def _make_periodic(sim: Simulation, x: tuple[float, float]) -> None:
     left, right = x
     limits.check_nodes((left, 0.0), (right, 0.0), name="PERIODIC")
     if not left < right:
-        raise CommandError(f"PERIODIC: left must be below right, got {left:g} and {right:g}")
+        raise CommandError(f"left must be below right, got {left:g} and {right:g}")
     if sim.settings.period:
-        raise CommandError("PERIODIC: the sides of this model are periodic already")
+        raise CommandError("the sides of this model are periodic already")
     if sim.clumps:
         raise CommandError(f"PERIODIC does not support clumps, and there are {sim.clumps.number}")
     if sim.bases:
@@ -159,9 +159,7 @@ def _make_periodic(sim: Simulation, x: tuple[float, float]) -> None:
         raise CommandError("PERIODIC does not support particles that are coupled to blocks")
     box = sim.walls.box()
     if box is not None and box[:2] != (left, right):
-        raise CommandError(
-            f"PERIODIC: x must be the sides of BOX, {box[0]:g} and {box[1]:g} m, got {left:g} and {right:g}"
-        )
+        raise CommandError(f"x must be the sides of BOX, {box[0]:g} and {box[1]:g} m, got {left:g} and {right:g}")
     sim.open_model()
     periodic_sides.refuse_outside(sim, sim.particles["x"], left, right)
     for side in ("left", "right") if box is not None else ():

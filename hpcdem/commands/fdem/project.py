@@ -41,11 +41,11 @@ class Project:
     Output. histories, charts, frames (interval in steps by name); framed: step of the last frame by name; cracks_filed:
     number of broken joints already written, None: the file of this model does not exist yet.
 
-    Steps. run_time: limit of model solve [s], 0: none; began: origin of run_time by part (clocks.PARTS); look: steps
-    between two evaluations of the ratio, 0: default; step_table: name of a table of the time step over time, "" none;
-    relative: tables whose times count from the moment at which a condition begins to use them; dynamic: motion in time
-    instead of towards equilibrium; adapts: the time step may change during a run; solved: outcome of the last `model
-    solve`: reason, ratio and steps.
+    Steps. run_time: limit of model solve [s], 0: none; began: origin of run_time by part (clocks.PARTS); check_every:
+    steps between two evaluations of the ratio, 0: default; step_table: name of a table of the time step over time, ""
+    none; relative: tables whose times count from the moment at which a condition begins to use them; dynamic: motion
+    in time instead of towards equilibrium; adapts: the time step may change during a run; solved: outcome of the last
+    `model solve`: reason, ratio and steps.
 
     Script. line: present line, for the log; names: returns the variables of the script to be saved in a checkpoint;
     place: returns the path to the present position in the script; progress: of the present command that steps, see

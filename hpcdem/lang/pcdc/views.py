@@ -74,8 +74,8 @@ class Accounts:
 class Model(Accounts):
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
-    def __init__(self, project: Any, look: Callable[..., Any]) -> None:
-        self._project, self._query = project, look
+    def __init__(self, project: Any, query: Callable[..., Any]) -> None:
+        self._project, self._query = project, query
 
     def _now(self, ask: Callable[[Any], Any]) -> Any:
         return self._query(lambda: ask(self._project))

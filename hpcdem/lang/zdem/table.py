@@ -519,7 +519,7 @@ COMMANDS = (
                    default="1e-3 of the largest radius in a step", source="X"),
             Option("segments", "segments of the base", kind=COUNT,
                    default="20 per flexural parameter, at least 50", source="X"),
-            Option("off", "the base stays as it is", source="X"),
+            Option("off", "ends the coupling; the base keeps its present shape", source="X"),
         ),
         ranged=True,
         example=(
@@ -536,7 +536,7 @@ COMMANDS = (
         "the crossings (laps). Not with clumps, FLEXURE, SURFACE or coupled blocks.",
         source="X",
         options=(
-            Option("x", "left and right side; left out where the sides are periodic already", kind=INTERVAL, unit="m",
+            Option("x", "left and right side; omit it if the sides are periodic already", kind=INTERVAL, unit="m",
                    source="X"),
             Option("xv", "velocity of the right side relative to the left one, negative to shorten; 0 ends it. "
                    "Particles that are not fixed along x get the velocities of a homogeneous strain", kind=FLOAT,
@@ -722,8 +722,9 @@ COMMANDS = (
     ),
     Command(
         "TWIN",
-        "Moves one free particle, drawn by the number, by 1e-5 of its radius; twin 0 is the model itself. Twins show "
-        "how far results depend on chance (hpcdem sweep --twins).",
+        "Moves one free particle by 1e-5 of its radius; the number determines which particle, and the direction. Twin "
+        "0 is the undisturbed model. Twins show how much results depend on chance (hpcdem sweep --twins).",
+        source="X",
         leading=(Option("number", "number of the twin", kind=INDEX, required=True, source="X"),),
         ranged=True,
         example=("TWIN 3", "TWIN 3 RANGE group rock"),

@@ -341,7 +341,11 @@ def test_the_example_flows_as_its_caption_says(launch: Launcher, tmp_path):
 def test_what_cannot_act_is_refused(tmp_path):
     sim = model(tmp_path)
     walls.box(sim, 0.0, 4.0, 0.0, 2.0)
-    for wrong, text in (((0.0, 3.0), "sides of BOX"), ((4.0, 0.0), "below right"), ((0.0, math.inf), "PERIODIC")):
+    for wrong, text in (
+        ((0.0, 3.0), "^x must be the sides of BOX"),
+        ((4.0, 0.0), "^left must be below right"),
+        ((0.0, math.inf), "PERIODIC"),
+    ):
         with pytest.raises(CommandError, match=text):
             walls.periodic(sim, wrong)
     particles.ball(sim, 0, 5.0, 1.0, 0.1)

@@ -206,7 +206,7 @@ def test_what_cannot_act_is_refused(tmp_path):
     other = model(tmp_path)
     with pytest.raises(CommandError, match="give x, the left and the right side"):
         walls.periodic(other, xv=-1.0)
-    with pytest.raises(CommandError, match="HIST period: the sides are not periodic yet"):
+    with pytest.raises(CommandError, match=r"^period: the sides are not periodic yet"):
         history.hist(other, 1, 10, "period")
     with pytest.raises(ScriptError, match="give x, the left and the right side, or xv"):
         parse_text("START\nPERIODIC\nSTOP\n", "script.py")
