@@ -18,7 +18,7 @@ from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.models import COHESIVE
 from tests.pretended import Pretended, Ranks
-from tests.space.support import ROCK, box
+from tests.space.support import ROCK, box, faces_on
 
 STEPS = 12
 """Before a checkpoint, and again after it."""
@@ -147,6 +147,28 @@ def test_a_fault_breaks_to_the_same_bits(any_cuts: None) -> None:
         return run(sim, 40), len(sim.event_rows)
 
     (alone, cracks), parts = torn(SerialComm()), Ranks(6).run(torn)
+    assert cracks > 5 and together([part for part, _ in parts]) == alone
+
+
+@pytest.mark.parametrize("collision", [True, False])
+def test_loads_and_a_hole_come_to_the_same_bits(any_cuts: None, collision: bool) -> None:
+    """Loads at common nodes, added masses, forces left by a hole and its fill reach elements of other ranks."""
+
+    def dug(comm: Any) -> tuple[dict, int]:
+        sim = faulted(comm)
+        mesh = sim.the_mesh()
+        sim.option(collision=collision)
+        sim.time_step(mass_scaling=3e-4)
+        sim.stress_condition(faces_on(mesh, "top"), normal=-3e5, xz=5e4)
+        sim.stress_condition(faces_on(mesh, "right"), quiet=True, incoming_y=0.5)
+        run(sim, 15)
+        hole = np.flatnonzero((np.abs(mesh.centroids() - (0.6, 0.4, 0.4)) < 0.2).all(axis=1))
+        changes.null(sim, hole, relax=20.0 * sim.clock.dt)
+        run(sim, 8)
+        changes.element_model(sim, hole[:40], "mech_iso_elastic", {**ROCK, "young": 5e7})
+        return run(sim, 10), len(sim.event_rows)
+
+    (alone, cracks), parts = dug(SerialComm()), Ranks(6).run(dug)
     assert cracks > 5 and together([part for part, _ in parts]) == alone
 
 

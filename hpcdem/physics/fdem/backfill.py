@@ -17,6 +17,11 @@ from scipy.spatial import cKDTree
 
 from hpcdem.physics.fdem.tetrahedra import FACES
 
+TORN = 0.1
+"""Limit of tearing: where the corners that meet in a point are farther apart than this fraction of the mean edge, the
+body counts as torn, and elements that are filled in again are not connected with it. The overlap of others with them
+may be as large."""
+
 
 def extended(points: np.ndarray, cells: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (np, c) at all points of the elements `cells` (n, 4): given where known (np,) bool, harmonic elsewhere;

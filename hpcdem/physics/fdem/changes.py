@@ -19,10 +19,6 @@ from hpcdem.physics.fdem.topology import Numbers, finite
 from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"
-TORN = 0.1
-"""Limit of tearing: where the corners that meet in a point are farther apart than this fraction of the mean edge, the
-body counts as torn, and elements that are filled in again are not connected with it. The overlap of others with them
-may be as large."""
 
 
 def crack(sim: Blocks, joints: Numbers) -> None:
@@ -98,7 +94,7 @@ def _bring_back(sim: Blocks, back: np.ndarray) -> None:
     """Elements (n,) that were removed are there again, of new material: free of strain and initial stress where
     the void is now (backfill.py), moving with it. Faces between them, and to elements around them, are connected
     without joints and loads, unless they are cracks of the mesh or the body is torn there."""
-    mesh, allowed = sim.the_mesh(), TORN * sim.mean_edge
+    mesh, allowed = sim.the_mesh(), backfill.TORN * sim.mean_edge
     cells, n_points = mesh.cells, len(mesh.points)
     own = cells[back]
     on_void = np.zeros(n_points + 1, bool)  # the last one is for the fourth corner of triangles

@@ -392,9 +392,9 @@ class Blocks(Edited):
         if not frozen:
             rebuild_state.skin = self._skin()
             margin = MARGIN * self.mean_edge if self.options.collision else 0.0
-            self.linked_within = max(self._longest, of_loads) * (1.0 + 1e-9)
+            self.linked_within = max(self._longest, of_loads, self.spread()) * (1.0 + 1e-9)
             self.apart_within = max(margin * (1.0 + 1e-9), self.linked_within)
-            needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + margin
+            needed = max(2.0 * radius + self.spread(), self._longest, of_loads) * (1.0 + 1e-9) + margin
             if not needed <= rebuild_state.side <= 1.2 * needed:
                 rebuild_state.side = 1.05 * needed
         return self.ownership.cells(middle, rebuild_state.side)

@@ -19,7 +19,7 @@ from hpcdem.core.units import with_prefix
 from hpcdem.engine.model import Model
 from hpcdem.engine.rebuild import RebuildState
 from hpcdem.halo.beyond import Beyond
-from hpcdem.physics.fdem import hexahedra
+from hpcdem.physics.fdem import backfill, hexahedra
 from hpcdem.physics.fdem.conditions import Relaxation
 from hpcdem.physics.fdem.definition import ModelDefinition
 from hpcdem.physics.fdem.histories import Histories
@@ -230,6 +230,10 @@ class State(ModelDefinition, Model):
             rows = self.where[mine[:, 8, None] + np.arange(hexahedra.PARTS)] - self.n_left
             self._hex_rows = self.number, hexahedra.Rows(mesh.points, mesh.cells, mine, rows)
         return self._hex_rows[1]
+
+    def spread(self) -> float:
+        """Largest distance of corners of one node [m]: elements that are filled in again connect corners apart."""
+        return 2.0 * backfill.TORN * self.mean_edge if len(self.born) else 0.0
 
     def masses_change(self) -> bool:
         """Masses or the time step will be others with the next lists."""
