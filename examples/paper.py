@@ -4,7 +4,7 @@
 #           of each fault over shortening, deflection of the base, distortional strain
 # model     32 km of bonded rock, 2 km thick, on an elastic plate that is broken below the mountain belt; a wall pushes
 #           7 km while sediment fills the basin; 2400 to 2950 spheres of radius 80 and 105 m
-# run       hpcdem examples/paper.py -j 2      (some two minutes on two cores)
+# run       hpcdem examples/paper.py -j 2      (two to three minutes of one core)
 # results   examples/data: paper_sections, paper_slip, paper_flexure, paper_strain (.png, .pdf); frames every 250 m;
 #           measure/*.csv, flexure.csv, surface.csv, ss/data/*.npz
 # -----------------------------------------------------------------------------

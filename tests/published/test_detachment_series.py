@@ -5,7 +5,7 @@ cohesion 2e7 Pa, 10 km of shortening): friction 0.2 and 0.3 give imbricate foret
 fore- and backthrusts in pairs (pop-ups) that reach farther; strain on the detachment runs 5 to 10 km ahead of the
 deformation of the surface. Here the bed is half as long and half as thick and is pushed half as far, with the same
 material: style and order are compared, not lengths. Which thrust forms next is chaotic: the share of backthrusts in one
-bed on a frictionless detachment lies between 0.40 and 0.52, so styles are compared over five beds.
+bed on a frictionless detachment lies between 0.24 and 0.46, so styles are compared over five beds.
 """
 
 from __future__ import annotations
@@ -73,13 +73,15 @@ def belts(push: Series) -> dict[float, Belt]:
 
 @pytest.fixture(scope="module")
 def styles(push: Series) -> dict[float, list[Belt]]:
-    """Of all beds, on the weakest and on the strongest detachment."""
-    frames = push([_run(seed, mu) for mu in (0.0, 0.3) for seed in BEDS])
-    return {mu: [belt(one) for one in frames[k : k + len(BEDS)]] for mu, k in ((0.0, 0), (0.3, len(BEDS)))}
+    """Of all beds, on the weakest and on the strong detachments."""
+    found = {}
+    for mu in (0.0, 0.2, 0.3):
+        found[mu] = [belt(frames) for frames in push([_run(seed, mu) for seed in BEDS])]
+    return found
 
 
 def _run(seed: int, mu: float) -> dict[str, float]:
-    return dict(seed=seed, detachment=mu, tension=1e7, way=5000.0, speed=4.0)
+    return dict(seed=seed, detachment=mu, tension=1e7, way=5000.0, speed=2.5)
 
 
 @pytest.mark.slow
@@ -107,10 +109,11 @@ def test_pop_ups_on_a_weak_detachment_forethrusts_on_a_strong_one(
     weak = styles[0.0]
     assert slip(weak, 1) < 1.5 * slip(weak, -1)
     assert all({t.vergence for t in b.thrusts if t.slip > 300.0} == {1, -1} for b in weak)
-    error = np.sqrt((back[0.0].var(ddof=1) + back[0.3].var(ddof=1)) / len(BEDS))
-    assert back[0.0].mean() > back[0.3].mean() + 2.0 * error
-    for strong in ([belts[0.2]], styles[0.3]):
-        assert back[0.0].mean() > 1.3 * np.mean([b.back for b in strong]) and max(b.back for b in strong) < 0.35
+    for mu in (0.2, 0.3):
+        strong = styles[mu]
+        error = np.sqrt((back[0.0].var(ddof=1) + back[mu].var(ddof=1)) / len(BEDS))
+        assert back[0.0].mean() > back[mu].mean() + 2.0 * error and back[0.0].mean() > 1.3 * back[mu].mean()
+        assert back[mu].max() < 0.35
         assert slip(strong, 1) > 1.5 * slip(strong, -1)
         assert all(max(b.thrusts, key=lambda t: t.slip).vergence == 1 for b in strong)
     assert belts[0.1].back > min(belts[0.2].back, belts[0.3].back)

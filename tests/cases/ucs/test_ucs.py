@@ -46,27 +46,25 @@ def check(found: Study, cohesion: float = COHESION) -> None:
     assert found.curve[-1, 1] < 0.6 * result["peak"]
 
 
-COARSE = {"size": 0.009, "transits": 20}
-
-
 def test_coarse_specimen(launch, tmp_path):
     """Few elements: a crack has to go round them, so the strength is no bound."""
-    found = study(launch, tmp_path, "ucs", **COARSE)
+    found = study(launch, tmp_path, "ucs", size=0.009, transits=20)
     assert found.result["peak"] > 0.6 * exact.strongest(COHESION, FRICTION)
     found.result["peak"] = min(found.result["peak"], exact.strongest(COHESION, FRICTION))
     check(found)
 
 
 @pytest.mark.slow
-def test_a_cylinder(launch, tmp_path):
+@pytest.mark.parametrize("overlay", [10.0, 100.0])
+def test_a_cylinder(launch, tmp_path, overlay):
     """In space, coarse: stiffness of rock and joints, strength within its bounds, cracks of both kinds."""
     diameter, height = 0.05, 0.1
     found = study(launch, tmp_path, "ucs", 3600, dim=3, width=diameter, height=height, size=0.01, transits=10,
-                  platens=False, penalty_overlay=10.0)  # fmt: skip
+                  platens=False, penalty_overlay=overlay)  # fmt: skip
     strongest = exact.strongest(COHESION, FRICTION)
     assert 0.6 * strongest <= found.result["peak"] <= strongest
     body = np.pi / 4 * diameter**2 * height
-    stiff = exact.modulus_in_space(found.state.points[found.state.joints], body, YOUNG, 10 * YOUNG, 10 * YOUNG)
+    stiff = exact.modulus_in_space(found.state.points[found.state.joints], body, YOUNG, 10 * YOUNG, overlay * YOUNG)
     assert found.result["modulus"] == pytest.approx(stiff, rel=0.05)
     assert found.result["tension"] > 0 and found.result["shear"] > 0
     assert found.result["energy_error"] < 0.01 and found.curve[-1, 1] < 0.6 * found.result["peak"]
@@ -85,14 +83,10 @@ def test_joints_across_and_askew_in_space():
 
 
 @pytest.mark.slow
-def test_specimen(launch, tmp_path):
-    check(study(launch, tmp_path, "ucs", 7200))
-
-
-@pytest.mark.slow
-def test_half_the_cohesion(launch, tmp_path):
-    whole = study(launch, tmp_path / "whole", "ucs", **COARSE)
-    half = study(launch, tmp_path / "half", "ucs", cohesion=0.5 * COHESION, **COARSE)
+def test_specimen_and_half_its_cohesion(launch, tmp_path):
+    whole = study(launch, tmp_path / "whole", "ucs", 7200)
+    check(whole)
+    half = study(launch, tmp_path / "half", "ucs", 7200, cohesion=0.5 * COHESION)
     assert half.result["peak"] < 0.8 * whole.result["peak"]
     assert half.result["energy_error"] < 0.01
 
