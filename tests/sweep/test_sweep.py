@@ -209,7 +209,7 @@ def test_a_driver_that_is_asked_to_stop_lets_members_save_and_continues(tmp_path
     assert [one.state for one in hpcdem.Sweep.open(tmp_path / "push_sweep").members] == [RUNNING, "waiting"]
     first.terminate()
     out, err = first.communicate(timeout=60)
-    assert first.returncode == 85, out + err
+    assert first.returncode == 85, out + err + (tmp_path / "push_sweep/0000/out.log").read_text()
     assert read_json(tmp_path / "push_sweep/0000/state.json", None)["state"] == "stopped"
     assert "no member is done" in call("report", "push_sweep", cwd=tmp_path, code=1)
 
