@@ -230,7 +230,7 @@ def test_a_script_goes_back_to_a_time(tmp_path, monkeypatch):
 
 def test_a_history_of_forces_is_whole_across_rebuilds(tmp_path):
     """A record reads the forces of the next step, whose rebuild may replace their tables: the numbers are those of
-    single steps, after each of which forces are computed anew."""
+    single steps, after each of which forces are recomputed."""
     text = """
 pcdc mesh structured (0,0) (4,1) cells 8 2
 pcdc mesh structured (1,1.02) (2,2.02) cells 2 2

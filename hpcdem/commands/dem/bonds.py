@@ -57,7 +57,7 @@ def bond(
     tolerate : largest gap across which a pair is bonded [m] (default: 1e-6).
     rext : factor on the radii in the search for pairs (default: 1).
     fric : friction coefficient of the particles.
-    rubber : bool: mark the bonds as those of a membrane; the motion does not depend on it.
+    rubber : bool: label the bonds as a membrane; the label has no mechanical effect.
     conserving : bool: use one shear stiffness for open and touching bonds, so that opening and closing conserve energy;
         for contact bonds of Hertz particles, the stiffness at the moment of bonding.
     moment : bool: elastic bonds resist relative rotation and break in tension by the stress at their outer fibre.

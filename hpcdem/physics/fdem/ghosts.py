@@ -16,10 +16,15 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
+def _alike(sim: State) -> bool:
+    """Return whether no elements are set apart: on one rank, and in strips of the plane, whose ghosts are few."""
+    return sim.dim == 2 or sim.comm.size == 1
+
+
 def inner(sim: State, number: np.ndarray) -> np.ndarray:
     """Return which of the elements (n,) meet others only where they share corners, bool: no corner of them is on the
     surface, where they can touch other bodies, or at a face with a joint. Collective."""
-    if sim.dim == 2 or sim.comm.size == 1:
+    if _alike(sim):
         return np.zeros(len(number), bool)
     out = np.ones(len(number), bool)
     if sim.options.collision:
@@ -41,7 +46,7 @@ def boxes(sim: State, order: np.ndarray, inside: np.ndarray) -> np.ndarray | Non
     """Boxes (n, 6) [m] of the elements in this order, in the plane None: those of elements that one rank must hold
     overlap. Middles lie in boxes, so boxes of partners of a joint are not farther apart than these. inside: see
     `inner`."""
-    if sim.dim == 2 or sim.comm.size == 1:
+    if _alike(sim):
         return None
     out, mesh = np.empty((len(order), 6)), sim.the_mesh()
     for some, margin in ((np.flatnonzero(inside), sim.linked_within), (np.flatnonzero(~inside), sim.apart_within)):
@@ -69,7 +74,7 @@ def owners(sim: State, number: np.ndarray) -> np.ndarray:
 def set_apart(sim: State, number: np.ndarray, inside: np.ndarray, sends: Sends) -> tuple[Beyond, Sends]:
     """Distinguish elements beyond from ghosts. number (n,): of owned elements, in the order of the storage; inside: see
     `inner`; sends: those that other ranks need. Returns which are beyond, and those that become ghosts. Collective."""
-    if sim.dim == 2 or sim.comm.size == 1 or sim.surface_loads or len(sim.the_mesh().macros):
+    if _alike(sim) or sim.surface_loads or len(sim.the_mesh().macros):
         return Beyond.nobody(sim.comm), sends  # other physics need positions of all
     rows = {p: np.arange(of.start, of.stop) if isinstance(of, slice) else of for p, of in sends.items()}
     found = Beyond.of(sim.comm, number, {p: of[inside[of]] for p, of in rows.items()})
